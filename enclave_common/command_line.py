@@ -17,7 +17,7 @@ from typing import Any, NoReturn, Protocol
 from enclave_common import VERSION
 from enclave_common.add_ons import add_ons
 from enclave_common.dependencies import missing_dependency
-from enclave_common.terminal import OutputError
+from enclave_common.terminal import OutputError, quoted
 from enclave_common.words import did_you_mean
 
 _INVALID_CHOICE = re.compile(r".*invalid choice: '([^']*)' \(choose from (.*)\)$", re.DOTALL)
@@ -303,6 +303,18 @@ def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -
     except BrokenPipeError:
         _drop_output()
         return 0
+    except Exception as error:
+        # By name: this module must not load cryptography.
+        if (type(error).__module__, type(error).__name__) != ("cryptography.exceptions", "InternalError"):
+            raise
+        causes = re.findall(r"error:[0-9A-F]{8}:[^:]*:[^:]*:([^:]*):", str(error)) or [str(error)[-200:]]
+        where = os.environ.get("OPENSSL_CONF") or "the machine's openssl.cnf"
+        text = f"OpenSSL cannot work as {quoted(where)} configures it: {', '.join(dict.fromkeys(causes))}"
+        print(
+            f"{program}: error: {text}; activate the providers that it names, or the default one",
+            file=sys.stderr,
+        )
+        return 1
 
 
 def _drop_output() -> None:

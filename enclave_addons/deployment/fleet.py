@@ -12,9 +12,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_addons.deployment.bundle_file import read_bundle
 from enclave_addons.deployment.host_bundles import SUFFIX, last_signed
 from keystore.disk import layout, safe_files
-from keystore.disk.archive import read_bundle
 from keystore.disk.deployed import find_differences, read_manifest
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
@@ -121,11 +121,7 @@ def _sources(places: Iterable[Path | str]) -> Iterator[Path]:
 
 
 def _manifest(place: Path, reference: Reference | None) -> Manifest:
-    signed = (
-        read_bundle(place).get(layout.BUNDLE, b"")
-        if place.is_file()
-        else safe_files.read(place, layout.BUNDLE)
-    )
+    signed = read_bundle(place).signed if place.is_file() else safe_files.read(place, layout.BUNDLE)
     return read_manifest(signed, printable(place), reference.signers if reference is not None else None)
 
 
@@ -157,7 +153,7 @@ def _ends(manifest: Manifest, now: datetime, limit: datetime) -> Iterator[str]:
 
 def _changed(place: Path, manifest: Manifest) -> Iterator[str]:
     if place.is_file():
-        content = read_bundle(place)
+        content = read_bundle(place).opened(manifest)
         for name, digest in manifest.files.items():
             if name not in content or fingerprint(content[name]) != digest:
                 yield f"{name} is missing in the bundle, or is not the file that was signed"

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from enclave_addons.deployment.bundle_file import bundle_bytes
 from enclave_addons.deployment.hosts import Hosts, refuse_host_name
 from enclave_addons.deployment.public_files import files_of, refuse_unfit
 from keystore.disk import layout, safe_files, store
-from keystore.disk.archive import archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
 from keystore.disk.register_file import read_register
 from keystore.disk.store import Content, Store, write_new
@@ -130,7 +130,7 @@ def _export(
             batch.file(layout.signed_bundle(host), signed, store.PRIVATE_MODE)
     else:
         manifest, signed = present
-    content = archive_bytes({layout.BUNDLE: Content(signed), **files})
+    content = bundle_bytes(signed, {name: file.data for name, file in files.items()})
     return HostBundle(_write(output, host, content, opened.root), manifest, is_new)
 
 

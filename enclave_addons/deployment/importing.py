@@ -16,10 +16,10 @@ from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_addons.deployment.bundle_file import SealedBundle, read_bundle
 from enclave_addons.deployment.host_keys import HostKey, find_key, forget_pending
 from enclave_common.words import some_of
 from keystore.disk import layout, lock, safe_files, store
-from keystore.disk.archive import read_bundle
 from keystore.disk.container_copies import (
     ContainerUser,
     container_entries,
@@ -109,13 +109,13 @@ def import_bundle(
     """
     chosen = options or ImportOptions()
     versions = Versions(keystore)
-    content = read_bundle(Path(bundle))
+    sealed = read_bundle(Path(bundle))
     with versions.opened(chosen.lock_timeout):
         present = _present(versions.current, chosen.host)
         pins = _pins(present, chosen)
         if not chosen.authorities and versions.current is not None:
-            pins = _with_successors(pins, content.get(layout.HANDOVER), KeystoreView(versions.current))
-        found = _checked(content, printable(bundle), present, pins, chosen)
+            pins = _with_successors(pins, sealed.handover, KeystoreView(versions.current))
+        found = _checked(sealed, present, pins, chosen)
         differing: list[str] = []
         owned = container_owner(versions.current) if versions.current is not None else None
         owner = chosen.owner or owned
@@ -158,26 +158,20 @@ def _present(version: Path | None, host: str | None) -> Manifest | None:
 
 
 def _checked(
-    content: Mapping[str, bytes],
-    place: str,
+    sealed: SealedBundle,
     present: Manifest | None,
     pins: Mapping[Role, frozenset[str]],
     options: ImportOptions,
 ) -> _Bundle:
-    """Return the bundle in ``content`` if it is whole. Who signed it comes first: nothing is believed before."""
-    signed = content.get(layout.BUNDLE)
-    if signed is None:
-        raise DamagedKeystoreError(
-            f"{place} has no {layout.BUNDLE}: not a host's bundle (secure-keystore export --hosts), or cut off"
-        )
-    document = smime.read(signed, place)
-    _check_signer(document, content, pins, place)
-    manifest = parse_manifest(document.document, place)
-    _refuse_other_host(manifest, present, options, place)
-    found = _Bundle(manifest, {name: data for name, data in content.items() if name != layout.BUNDLE}, place)
+    """Return the bundle if it is whole. Who signed it comes first: nothing is believed before."""
+    document = smime.read(sealed.signed, sealed.place)
+    _check_signer(document, sealed, pins)
+    manifest = parse_manifest(document.document, sealed.place)
+    _refuse_other_host(manifest, present, options, sealed.place)
+    found = _Bundle(manifest, sealed.opened(manifest), sealed.place)
     _check_files(found)
     _check_authorities(found, options)
-    return found._replace(files={**found.files, layout.BUNDLE: signed})
+    return found._replace(files={**found.files, layout.BUNDLE: sealed.signed})
 
 
 def _pins(present: Manifest | None, options: ImportOptions) -> dict[Role, frozenset[str]]:
@@ -193,14 +187,14 @@ def _pins(present: Manifest | None, options: ImportOptions) -> dict[Role, frozen
 
 
 def _with_successors(
-    pins: Mapping[Role, frozenset[str]], handover: bytes | None, present: KeystoreView
+    pins: Mapping[Role, frozenset[str]], handover: bytes, present: KeystoreView
 ) -> dict[Role, frozenset[str]]:
     """Return ``pins`` and the CAs that a permissions CA trusted here has named as those that follow it.
 
     A handover by another CA is of a replacement that this host has followed already, or is forged: it changes nothing.
     """
     named: Mapping[Role, frozenset[str]] = {}
-    if handover is not None:
+    if handover:
         with suppress(DamagedKeystoreError):
             document = smime.read(handover, layout.HANDOVER)
             smime.check(document, present.ca_bundle(Role.PERMISSIONS), layout.HANDOVER)
@@ -209,15 +203,10 @@ def _with_successors(
 
 
 def _check_signer(
-    document: smime.SignedDocument,
-    content: Mapping[str, bytes],
-    pins: Mapping[Role, frozenset[str]],
-    place: str,
+    document: smime.SignedDocument, sealed: SealedBundle, pins: Mapping[Role, frozenset[str]]
 ) -> None:
-    name = layout.ca_cert(Role.PERMISSIONS)
-    if name not in content:
-        raise DamagedKeystoreError(f"{place} lacks {name}: it is cut off, or was changed; copy it again")
-    authorities = read_certificates(content[name], f"{place}: {name}")
+    place = sealed.place
+    authorities = read_certificates(sealed.authorities, f"{place}: {layout.ca_cert(Role.PERMISSIONS)}")
     trusted = [ca for ca in authorities if fingerprint(ca.der) in pins[Role.PERMISSIONS]]
     if not trusted:
         raise UnsafeKeystoreError(
@@ -257,11 +246,9 @@ def _check_files(found: _Bundle) -> None:
     )
     for name in sorted(set(manifest.files) ^ expected):
         raise DamagedKeystoreError(f"{place}: its list of files does not fit its enclaves: {printable(name)}")
-    for name in sorted(set(found.files) - expected):
-        raise UnsafeKeystoreError(f"{place} holds an unsigned file: {printable(name)}")
+    for name in sorted(set(found.files) ^ expected):
+        raise UnsafeKeystoreError(f"{place}: {name} is not as its manifest says")
     for name, digest in sorted(manifest.files.items()):
-        if name not in found.files:
-            raise DamagedKeystoreError(f"{place} lacks {name}; copy it again")
         if fingerprint(found.files[name]) != digest:
             raise UnsafeKeystoreError(f"{place}: {name} is not the file that was signed; copy it again")
 

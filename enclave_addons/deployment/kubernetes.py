@@ -212,5 +212,5 @@ def _network_policy(deployment: Deployment, domain: int) -> dict[str, Any]:
 
 
 def _literal(text: str) -> str:
-    """Escape ``$``: Kubernetes expands ``$(NAME)``."""
-    return text.replace("$(", "$$(")
+    """Escape ``$``: Kubernetes expands ``$(NAME)``, and takes ``$$`` for one ``$``."""
+    return text.replace("$", "$$")

@@ -91,13 +91,15 @@ class Pair(NamedTuple):
 
 def mixed_pairs(members: Iterable[EnclaveProcess]) -> tuple[Pair, ...]:
     """Return every pair of enclaves with a Fast and a Cyclone process in one domain, sorted."""
-    everybody = tuple(members)
+    enclaves: dict[tuple[Vendor | None, int], set[str]] = {}
+    for one in members:
+        enclaves.setdefault((one.vendor, one.domain), set()).add(one.enclave)
     pairs = {
-        Pair(one.enclave, other.enclave)
-        for one in everybody
-        if one.vendor is Vendor.FAST
-        for other in everybody
-        if other.vendor is Vendor.CYCLONE and other.domain == one.domain
+        Pair(fast, cyclone)
+        for (vendor, domain), found in enclaves.items()
+        if vendor is Vendor.FAST
+        for cyclone in enclaves.get((Vendor.CYCLONE, domain), ())
+        for fast in found
     }
     return tuple(sorted(pairs))
 

@@ -24,7 +24,7 @@ from typing import NamedTuple
 from keystore.errors import printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_names import DISCOVERY_TOPIC, Topics, add_dds_topics, full_name
-from keystore.formats.permissions_patterns import any_matches, can_meet, covers, has_wildcard
+from keystore.formats.permissions_patterns import Expressions, any_matches, covers, has_wildcard
 from keystore.formats.policy import EnclavePolicy, PolicyError, Qualifier
 from keystore.formats.validity import ZONES, Validity
 
@@ -133,49 +133,46 @@ def _resolve_denials(allowed: tuple[set[str], set[str]], denied: tuple[set[str],
     creating it, so a remaining denial would block the other direction too (cyclonedds issues 1922,
     2267). Names granted in the other direction therefore come once more, before the denials.
     """
-    granted = tuple({t for t in a if not _any_covers(d, t)} for a, d in zip(allowed, denied, strict=True))
+    refused = (Expressions(denied[0]), Expressions(denied[1]))
+    granted = tuple({t for t in a if not d.cover(t)} for a, d in zip(allowed, refused, strict=True))
+    given = (Expressions(granted[0]), Expressions(granted[1]))
     kept = tuple(
-        {d for d in denials if any(has_wildcard(g) and can_meet(g, d) for g in grants)}
-        for grants, denials in zip(granted, denied, strict=True)
+        {d for d in denials if any(map(has_wildcard, grants.meeting(d)))}
+        for grants, denials in zip(given, denied, strict=True)
     )
     first: tuple[set[str], set[str]] = (set(), set())
     hazards: list[str] = []
     for direction in (0, 1):
         other = 1 - direction
         for denial in sorted(kept[direction]):
-            again, blocked = _other_direction(denial, granted[other], denied[other])
+            again, blocked = _other_direction(denial, given[other], refused[other])
             first[other].update(again)
-            hazards.extend(
-                f"Cyclone DDS before 11.0 will not let this enclave {_VERB[other]} topics of {grant} that "
-                f"match {denial}, because it may not {_VERB[direction]} them; name the topics one by one"
-                for grant in blocked
-            )
+            if blocked:
+                more = f" and {len(blocked) - 1} more" if len(blocked) > 1 else ""
+                hazards.append(
+                    f"Cyclone DDS before 11.0 will not let this enclave {_VERB[other]} topics of {blocked[0]}{more} "
+                    f"that match {denial}, because it may not {_VERB[direction]} them; name the topics one by one"
+                )
     return DdsRules(_sorted(first), _sorted(kept), _sorted(granted), tuple(hazards))
 
 
 _VERB = ("publish", "subscribe to")
 
 
-def _other_direction(denial: str, granted: set[str], denied: set[str]) -> tuple[set[str], list[str]]:
+def _other_direction(denial: str, granted: Expressions, denied: Expressions) -> tuple[set[str], list[str]]:
     """Return what to grant once more before ``denial`` of the opposite direction, and grants it may still block."""
     again: set[str] = set()
     blocked: list[str] = []
-    for grant in sorted(granted):
-        if not can_meet(grant, denial):
-            continue
+    for grant in granted.meeting(denial):
         if not has_wildcard(grant):
             again.add(grant)
-        elif covers(grant, denial) and not any(can_meet(denial, d) for d in denied):
+        elif covers(grant, denial) and not denied.meeting(denial):
             again.add(denial)
-        elif covers(denial, grant) and not any(can_meet(grant, d) for d in denied):
+        elif covers(denial, grant) and not denied.meeting(grant):
             again.add(grant)
-        elif not _any_covers(denied, denial):
+        elif not denied.cover(denial):
             blocked.append(grant)
     return again, blocked
-
-
-def _any_covers(denials: set[str], topic: str) -> bool:
-    return any(covers(denial, topic) for denial in denials)
 
 
 def _sorted(topics: tuple[set[str], ...]) -> TopicSets:

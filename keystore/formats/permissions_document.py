@@ -16,7 +16,7 @@ from keystore.errors import InvalidInputError, printable
 from keystore.formats.domains import Domains, read_domains
 from keystore.formats.permissions import HEAD, DdsRules, Permissions, TopicSets
 from keystore.formats.permissions_names import is_dds_expression, ros_rules
-from keystore.formats.permissions_patterns import can_meet, covers
+from keystore.formats.permissions_patterns import Expressions
 from keystore.formats.policy import Operation, PolicyError, Qualifier, Rule
 from keystore.formats.safe_xml import not_as_written, parse_foreign, parse_own
 from keystore.formats.subject import names_enclave
@@ -168,15 +168,12 @@ def taken_away(old: Permissions, new: Permissions) -> tuple[str, ...]:
 def _lost(old: Permissions, new: Permissions) -> Iterator[str]:
     narrower = not new.domains.covers(old.domains)
     for direction in TopicSets._fields:
-        allowed, present = _expressions(old.rules.allow, direction), _expressions(new.rules.allow, direction)
-        for topic in allowed:
-            if narrower or not (topic in present or any(covers(other, topic) for other in present)):
-                yield f"{direction} {topic}"
-        before = _expressions(old.rules.deny, direction)
-        for denial in _expressions(new.rules.deny, direction):
-            if not any(covers(one, denial) for one in before):
-                yield from (f"{direction} {topic}" for topic in allowed if can_meet(denial, topic))
-
-
-def _expressions(topics: TopicSets, direction: str) -> frozenset[str]:
-    return frozenset(getattr(topics, direction))
+        allowed, present = (
+            getattr(old.rules.allow, direction),
+            Expressions(getattr(new.rules.allow, direction)),
+        )
+        yield from (f"{direction} {topic}" for topic in allowed if narrower or not present.cover(topic))
+        before, had = Expressions(getattr(old.rules.deny, direction)), Expressions(allowed)
+        for denial in getattr(new.rules.deny, direction):
+            if not before.cover(denial):
+                yield from (f"{direction} {topic}" for topic in had.meeting(denial))

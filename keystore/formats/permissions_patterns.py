@@ -4,8 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Collection, Iterable
 from functools import lru_cache
+from typing import NamedTuple
+
+from keystore.errors import InvalidInputError
 
 _ALPHABET = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_/")
 _WILDCARDS = frozenset("*?[")
@@ -36,7 +41,7 @@ def has_wildcard(name: str) -> bool:
 
 def can_meet(a: str, b: str) -> bool:
     """Return whether some name matches both expressions."""
-    return _meet(_elements(a), _elements(b))
+    return _meet(_elements(a), _positions(b))
 
 
 def covers(wide: str, narrow: str) -> bool:
@@ -53,44 +58,136 @@ def covers(wide: str, narrow: str) -> bool:
     return wide.endswith("*") and not has_wildcard(prefix) and narrow.startswith(prefix)
 
 
-def _meet(a: tuple[Element, ...], b: tuple[Element, ...]) -> bool:
-    """Walk both at once; ``reachable``: the positions in ``b`` that the part of ``a`` so far pairs with."""
-    reachable = _past_stars({0}, b)
+class Expressions:
+    """Many expressions, to find those that one more can meet: only such as begin and end alike are compared.
+
+    Comparing is bounded: raises InvalidInputError for expressions that meet in more ways than anybody could review.
+    """
+
+    def __init__(self, expressions: Iterable[str]) -> None:
+        self._all = frozenset(expressions)
+        self._by_head, self._by_tail = _Ends(self._all, _head), _Ends(self._all, _tail)
+        self._work = 0
+
+    def meeting(self, expression: str) -> list[str]:
+        """Return those that some name matches together with ``expression``, sorted."""
+        if expression in self._all and not has_wildcard(expression):
+            alike = {expression}
+        else:
+            alike = set()
+        head, tail = _head(expression), _tail(expression)
+        sides = ((self._by_head, self._by_head.alike(head)), (self._by_tail, self._by_tail.alike(tail)))
+        ends, spans = min(sides, key=lambda side: sum(map(len, side[1])))
+        for one in (ends.expressions[at] for span in spans for at in span):
+            self._count(1)
+            if one in alike or not (has_wildcard(one) or has_wildcard(expression)):
+                continue
+            if _is_alike(_head(one), head) and _is_alike(_tail(one), tail):
+                self._count(len(one) + len(expression))
+                if can_meet(one, expression):
+                    alike.add(one)
+        return sorted(alike)
+
+    def cover(self, expression: str) -> bool:
+        """Return whether one of them surely matches all that ``expression`` matches."""
+        return expression in self._all or any(covers(one, expression) for one in self.meeting(expression))
+
+    def _count(self, work: int) -> None:
+        self._work += work
+        if self._work > _MOST_WORK:
+            raise InvalidInputError(
+                "wildcards and denials meet in too many ways to be compared; name the topics one by one"
+            )
+
+
+_MOST_WORK = 1_500_000
+"""Characters that are compared; a second or two."""
+
+
+class _Ends:
+    """Expressions by the plain text at one of their ends."""
+
+    def __init__(self, expressions: Iterable[str], end: Callable[[str], str]) -> None:
+        pairs = sorted((end(one), one) for one in expressions)
+        self.expressions = [one for _, one in pairs]
+        self._texts = [text for text, _ in pairs]
+
+    def alike(self, text: str) -> list[range]:
+        """Return where those stand whose end begins with ``text``, or is a beginning of it."""
+        found = [self._between(text[:length], text[:length]) for length in range(len(text))]
+        return [*filter(len, found), self._between(text, text + _LAST)]
+
+    def _between(self, first: str, last: str) -> range:
+        return range(bisect_left(self._texts, first), bisect_right(self._texts, last))
+
+
+_LAST = chr(0x10FFFF)
+
+
+def _is_alike(a: str, b: str) -> bool:
+    return a.startswith(b) or b.startswith(a)
+
+
+@lru_cache(maxsize=16384)
+def _head(expression: str) -> str:
+    return re.split(r"[*?\[]", expression, maxsplit=1)[0]
+
+
+@lru_cache(maxsize=16384)
+def _tail(expression: str) -> str:
+    return re.split(r"[*?\]]", expression)[-1][::-1]
+
+
+def _meet(a: tuple[Element, ...], b: _Positions) -> bool:
+    """Walk both at once; ``reachable``: a bit for each position in ``b`` that the part of ``a`` so far pairs with."""
+    reachable = 1 | (1 & b.stars) << 1
     for element in a:
-        step: set[int] = set()
-        for j in reachable:
-            if element is _ANY_TEXT:
-                step.update(range(j, len(b) + 1))
-            elif j < len(b):
-                other = b[j]
-                if other is _ANY_TEXT:
-                    step.add(j)
-                elif element & other:
-                    step.add(j + 1)
-        reachable = _past_stars(step, b)
+        if element is _ANY_TEXT:
+            lowest = reachable & -reachable
+            reachable = b.end * 2 - lowest
+        else:
+            fitting = 0
+            for character in element:
+                fitting |= b.of_character.get(character, 0)
+            reachable = (reachable & fitting) << 1 | reachable & b.stars
+        reachable |= (reachable & b.stars) << 1
         if not reachable:
             return False
-    return len(b) in reachable
+    return bool(reachable & b.end)
 
 
-def _past_stars(positions: set[int], pattern: tuple[Element, ...]) -> set[int]:
-    """Return ``positions`` and those behind any ``*`` that follows them, for a ``*`` may match nothing."""
-    result = set(positions)
-    for j in positions:
-        while j < len(pattern) and pattern[j] is _ANY_TEXT:
-            j += 1
-            result.add(j)
-    return result
+class _Positions(NamedTuple):
+    """Where in a pattern what may stand, as bits. ``end``: behind its last element."""
+
+    of_character: dict[str, int]
+    stars: int
+    end: int
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=16384)
+def _positions(pattern: str) -> _Positions:
+    of_character: dict[str, int] = {}
+    stars = 0
+    elements = _elements(pattern)
+    for at, element in enumerate(elements):
+        if element is _ANY_TEXT:
+            stars |= 1 << at
+        else:
+            for character in element:
+                of_character[character] = of_character.get(character, 0) | 1 << at
+    return _Positions(of_character, stars, 1 << len(elements))
+
+
+@lru_cache(maxsize=16384)
 def _elements(pattern: str) -> tuple[Element, ...]:
     elements: list[Element] = []
     i = 0
     while i < len(pattern):
         character = pattern[i]
         if character == "*":
-            elements.append(_ANY_TEXT)
+            elements += (
+                [] if elements[-1:] == [_ANY_TEXT] else [_ANY_TEXT]
+            )  # two in a row match the same as one
         elif character == "?":
             elements.append(_ALPHABET)
         elif character == "[" and "]" in pattern[i:]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import TopicSets, dds_rules
-from keystore.formats.permissions_patterns import can_meet, covers
+from keystore.formats.permissions_patterns import Expressions
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 
 _VERSION = 1
@@ -66,8 +66,9 @@ def _refuse_losses(enclave: str, shares: tuple[Share, ...], together: EnclavePol
         alone = dds_rules(EnclavePolicy(enclave, share.profiles))
         pairs = zip(_directions(alone.allow), _directions(alone.deny), _directions(whole.allow), strict=True)
         for (own, denied, granted), refused in zip(pairs, _directions(whole.deny), strict=True):
-            lost = [topic for topic in own if not any(covers(other, topic) for other in granted)]
-            lost += [topic for topic in own for one in refused if one not in denied and can_meet(one, topic)]
+            present, had = Expressions(granted), Expressions(own)
+            lost = [topic for topic in own if not present.cover(topic)]
+            lost += [topic for one in refused if one not in denied for topic in had.meeting(one)]
             if lost:
                 others = ", ".join(printable(other.owner) for other in shares if other is not share)
                 raise InvalidInputError(

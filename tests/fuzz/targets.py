@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import yaml
 
+from enclave_addons.deployment.bundle_file import bundle_bytes, sealed_bundle
 from enclave_addons.deployment.host_keys import parse_requests, requests_text
 from enclave_addons.deployment.hosts import parse_hosts
 from enclave_addons.observation.graph.discovery_info import decode as decode_discovery_info
@@ -24,8 +25,6 @@ from enclave_launch.description.markup.xml import parse_launch_xml as parse_laun
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
 from keystore import Domains, KeystoreError, request
-from keystore.disk.archive import archive_bytes, read_archive
-from keystore.disk.store import Content
 from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
@@ -239,10 +238,10 @@ def targets() -> dict[str, Target]:
         ),
         "hosts": Target(lambda data: parse_hosts(data, "a.yaml"), refused, (HOSTS,), YAML),
         "bundle": Target(
-            lambda data: read_archive(data, "a.bundle"),
+            lambda data: sealed_bundle(data, "a.bundle").opened(parse_manifest(MANIFEST, "a")),
             refused,
-            (archive_bytes({"enclaves/a/key.pem": Content(b"key", 0o600)}),),
-            words("\0", "ustar", "../", "0000600", "1", "2", "x", "L"),
+            (bundle_bytes(MANIFEST, {"public/identity_ca.cert.pem": b"ab"}),),
+            words("\n", "0\n", "1\n", "9", "-1\n", "enclave-launch bundle 1\n"),
         ),
         "bundle-manifest": Target(
             lambda data: parse_manifest(data, "a"),

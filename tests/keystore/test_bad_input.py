@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -213,3 +215,18 @@ def test_damage_is_not_deployed(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert main(["export", str(root), "-o", str(tmp_path / "out"), "--enclave", "/a"]) == 1
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_an_openssl_configuration_without_its_provider_is_an_error_with_its_cause(tmp_path: Path) -> None:
+    (tmp_path / "fips.cnf").write_text(
+        "openssl_conf = init\n[init]\nproviders = sect\nalg_section = alg\n[sect]\nfips = fips\n"
+        "[fips]\nactivate = 1\n[alg]\ndefault_properties = fips=yes\n"
+    )
+    words = [sys.executable, "-m", "keystore.verb", "create", str(tmp_path / "ks")]
+    for configuration, status in ((tmp_path / "fips.cnf", 1), (Path("/dev/null"), 0)):
+        done = subprocess.run(
+            words, env={**os.environ, "OPENSSL_CONF": str(configuration)}, capture_output=True, text=True,
+            cwd=Path(__file__).parents[2],
+        )  # fmt: skip
+        assert done.returncode == status and "Traceback" not in done.stderr
+        assert ("fips.cnf' configures it: unsupported" in done.stderr) == (status == 1)

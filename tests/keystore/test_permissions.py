@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore import Domains, EnclavePolicy, Operation, Profile, Qualifier, Rule, Validity
+from keystore import Domains, EnclavePolicy, InvalidInputError, Operation, Profile, Qualifier, Rule, Validity
 from keystore.formats.permissions import dds_rules, permissions_document
 from keystore.formats.permissions_document import granted_rules, parse_permissions
 from keystore.formats.permissions_names import dds_topics, full_name
@@ -334,3 +334,22 @@ def test_patterns_meet_exactly_when_some_name_fits_both(a: str, b: str, name: st
     assert can_meet(a, b) == can_meet(b, a)
     if covers(a, b) and can_meet(b, name):
         assert can_meet(a, name)
+
+
+def wide(pattern: str, count: int) -> tuple[Rule, ...]:
+    return tuple(allow("publish", pattern.format(number)) for number in range(count))
+
+
+def test_thousands_of_wildcards_and_denials_are_compared(count: int = 3_000) -> None:
+    denials = (*(deny("publish", f"/x{number}/secret") for number in range(count)), deny("publish", "/y7"))
+    rules = dds_rules(enclave(*wide("/x{}/*", count), *wide("/y{}", count), *denials))
+    assert len(rules.deny.publish) == count and len(rules.allow.publish) == 2 * count
+    assert not rules.permits("publish", "rt/x7/secret") and rules.permits("publish", "rt/x7/other")
+    assert not rules.permits("publish", "rt/y7") and rules.permits("publish", "rt/y8")
+
+
+def test_wildcards_that_all_meet_all_denials_are_refused() -> None:
+    grants, denials = wide("/*a" * 40 + "{}*", 1_500), wide("/*b" * 40 + "{}*", 1_500)
+    refused = tuple(rule._replace(qualifier=Qualifier.DENY) for rule in denials)
+    with pytest.raises(InvalidInputError, match="name the topics one by one"):
+        dds_rules(enclave(*grants, *refused))

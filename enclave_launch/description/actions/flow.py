@@ -218,8 +218,9 @@ class ForLoop(TemplateAction):
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         entities: list[LaunchDescriptionEntity] = []
-        for index in range(int(perform_substitutions(context, self.length))):
-            context.count_unfolded(_size_of(self.function))
+        length = int(perform_substitutions(context, self.length))
+        context.count_unfolded(_size_of(self.function) * max(length, 0))
+        for index in range(length):
             entities.extend(self._round(context, index) or ())
         return entities
 

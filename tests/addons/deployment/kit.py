@@ -10,9 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment.bundle_file import sealed_bundle
 from enclave_addons.review.verb import main
 from enclave_launch import EnclaveScope, ResolveOptions, SecurityOptions, provision, resolve
 from keystore import ProvisionOptions
+from keystore.disk import layout
+from keystore.disk.deployed import read_manifest
 
 DEMO_WS = Path(__file__).parents[3] / "fixtures" / "demo_ws"
 
@@ -85,3 +88,9 @@ def set_up_ros(folder: Path) -> str:
         lines.append(f"export CYCLONEDDS_HOME={shlex.quote(home)}")
     file.write_text("\n".join(lines) + "\n")
     return str(file)
+
+
+def files_of_bundle(content: bytes) -> dict[str, bytes]:
+    """Every file that a bundle carries, the manifest too."""
+    sealed = sealed_bundle(content, "bundle")
+    return {layout.BUNDLE: sealed.signed, **sealed.opened(read_manifest(sealed.signed, "bundle"))}

@@ -30,8 +30,8 @@ from keystore import (
     verify,
 )
 from keystore.disk import layout
-from keystore.disk.archive import read_archive
 from keystore.verb import main
+from tests.addons.deployment.kit import files_of_bundle
 from tests.keystore.kit import actions, certificate_of, filled, mode, openssl, options, policy
 
 NAMES = ("/arm", "/arm/hand")
@@ -70,7 +70,7 @@ def test_the_private_key_never_leaves_its_host(ca: Path, tmp_path: Path) -> None
     keys = private_keys(host.resolve())
     assert set(keys) == {"enclaves/arm/key.pem", "enclaves/arm/hand/key.pem"}
     assert private_keys(ca).keys() == {"enclaves/base/key.pem"}, "the CA has none of them any more"
-    travelled = read_archive((tmp_path / "out/arm.bundle").read_bytes(), "bundle")
+    travelled = files_of_bundle((tmp_path / "out/arm.bundle").read_bytes())
     assert not [name for name in travelled if name.endswith("key.pem")]
     assert not set(keys.values()) & set(travelled.values())
 
