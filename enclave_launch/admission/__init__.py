@@ -3,10 +3,11 @@
 import re
 import shlex
 from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.admission.middleware import VARIABLE, ZENOH, Vendor, middleware_of, vendor_of, why_not
-from enclave_launch.admission.variables import domain_of, overridden, own_security, preloaded
+from enclave_launch.admission.variables import domain_of, foreign_configurations, overridden, preloaded
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics import enclaves as diagnostics
 from enclave_launch.errors import UsageError
@@ -43,8 +44,8 @@ def refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iterator[Di
         domain_of(process.final_environment)
     except UsageError as error:
         yield diagnostics.domain_invalid(name, str(error), place)
-    for setting in own_security(process.final_environment):
-        yield diagnostics.security_configured(name, setting.variable, setting.value, place)
+    for found in foreign_configurations(process.final_environment, Path(process.cwd or ".").absolute()):
+        yield diagnostics.security_configured(name, found.variable, found.value, found.why, place)
 
 
 def notes(process: ResolvedProcess) -> Iterator[Diagnostic]:

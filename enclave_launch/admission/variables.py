@@ -1,14 +1,16 @@
 """Variables of a process that decide whether its enclave is used: those we set, those that could undo them, its domain.
 
 The runtime lays its own values over ``ROS_SECURITY_*``, so a launch file cannot take the enclave away through them; a
-warning says that they have no effect. Configurations of a DDS with security properties of their own are refused: which
-of the two would win is a matter of the DDS and its version.
+warning says that they have no effect. Security properties in a configuration of a DDS lose to ours (measured on Cyclone
+DDS 0.10.2 and Fast DDS 2.9.1), so such a file can silence a process; a discovery server leads past the enclave. Both
+are refused, and what cannot be read.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.environment import domain_id
@@ -39,7 +41,14 @@ _CONFIGURATIONS = (
     "FASTDDS_DEFAULT_PROFILES_FILE",
     "NDDS_QOS_PROFILES",
 )
+_ENVIRONMENT_FILE = "FASTDDS_ENVIRONMENT_FILE"
+_DEFAULT_PROFILES, _SKIP_DEFAULT = "DEFAULT_FASTRTPS_PROFILES.xml", "SKIP_DEFAULT_XML_FILE"
+_DISCOVERY_SERVER = re.compile(
+    r"ROS_DISCOVERY_SERVER|discoveryServersList|<\s*discoveryProtocol\s*>\s*(?:SUPER_)?(?:CLIENT|SERVER|BACKUP)"
+)
 _SECURITY = re.compile(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
+_REFERENCE = re.compile(r"\$\{(\w+)(?::-([^}]*))?\}")
+"""As Cyclone DDS takes parts of a document from the environment."""
 _PRELOAD = ("LD_PRELOAD", "LD_AUDIT")
 
 
@@ -64,14 +73,51 @@ def preloaded(environment: Mapping[str, str]) -> Iterator[Setting]:
             yield Setting(name, environment[name])
 
 
-def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
-    """Find configurations of a DDS with security properties of their own; reads the files that they are in."""
+class Foreign(NamedTuple):
+    """A configuration of a DDS that a secured process must not have, and why."""
+
+    variable: str
+    value: str
+    why: str
+
+
+def foreign_configurations(environment: Mapping[str, str], cwd: Path) -> Iterator[Foreign]:
+    """Find configurations with security settings, with a discovery server, or that cannot be read; reads the files as
+    the middleware does, relative ones from ``cwd``.
+
+    A discovery server is the one known way past an enclave: with it there is no handshake.
+    """
     for name in _CONFIGURATIONS:
-        # Cyclone DDS takes files and documents in one list, separated by commas, Connext by semicolons.
-        for part in re.split("[,;]", environment.get(name, "")):
-            text = part if "<" in part else text_or_nothing(part.strip().removeprefix("file://"))
-            if _SECURITY.search(text):
-                yield Setting(name, part)
+        for part in _parts(environment.get(name, "")):
+            text = part if "<" in part else text_or_nothing(cwd / part.removeprefix("file://"))
+            if why := _objection(text, environment):
+                yield Foreign(name, part, why)
+    others = {_ENVIRONMENT_FILE: environment.get(_ENVIRONMENT_FILE), _DEFAULT_PROFILES: None}
+    if environment.get(_SKIP_DEFAULT) != "1" and (cwd / _DEFAULT_PROFILES).exists():
+        others[_DEFAULT_PROFILES] = _DEFAULT_PROFILES
+    for name, file in others.items():
+        if file and (why := _objection(text_or_nothing(cwd / file), environment)):
+            yield Foreign(name, str(cwd / file), why)
+
+
+def _parts(value: str) -> Iterator[str]:
+    """Yield the documents in a value as one text, and each file: Cyclone DDS separates them by commas, Connext by
+    semicolons."""
+    documents = value[value.find("<") : value.rfind(">") + 1] if "<" in value else ""
+    between = re.findall(r">\s*[,;]([^<]+)[,;]\s*<", documents)
+    files = re.split("[,;]", ",".join((value.replace(documents, ",") if documents else value, *between)))
+    yield from filter(None, (documents, *map(str.strip, files)))
+
+
+def _objection(text: str, environment: Mapping[str, str]) -> str | None:
+    if not text.strip():
+        return "cannot be read, so nobody knows what is in it"
+    written = _REFERENCE.sub(lambda found: environment.get(found[1]) or found[2] or "", text)
+    if _SECURITY.search(written):
+        return "has security settings of its own, beside those of its enclave"
+    if _DISCOVERY_SERVER.search(written):
+        return "names a discovery server, with which Fast DDS makes no handshake"
+    return None
 
 
 def domain_of(environment: Mapping[str, str]) -> int:

@@ -160,12 +160,12 @@ def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) 
     )
 
 
-def security_configured(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
+def security_configured(
+    process: str, variable: str, value: str, why: str, place: SourceLocation
+) -> Diagnostic:
     shown = value if len(value) <= 60 else f"{value[:57]}..."
-    text = f"{variable} of {process} has security settings of its own, beside those of its enclave: {shown}"
-    return Diagnostic(
-        Code.SECURITY_CONFIGURED, process, text, place, "take them out: which of them win is not known"
-    )
+    text = f"{variable} of {process} {why}: {shown}"
+    return Diagnostic(Code.SECURITY_CONFIGURED, process, text, place, "take it out, or write it out in full")
 
 
 def variable_overridden(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:

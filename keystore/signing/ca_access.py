@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from keystore.errors import InvalidInputError, printable
 
+_PR_SET_DUMPABLE = 4
 _MAX_SECRET = 1023  # what OpenSSL takes for an encrypted key
 
 
@@ -36,6 +39,7 @@ class Secret:
     def value(self) -> bytes:
         """Return the secret without its trailing newline, read once; raises InvalidInputError."""
         if self._read is None:
+            keep_memory_private()
             self._read = self._fetch()
         return self._read
 
@@ -60,6 +64,12 @@ class Secret:
         if self.file is not None:
             return printable(self.file)
         return f"descriptor {self.descriptor}" if self.descriptor is not None else f"${self.variable}"
+
+
+def keep_memory_private() -> None:
+    """Leave no core dump of this process, and let nobody of the same user read its memory (prctl(2), Linux alone)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
 
 
 def _read_all(descriptor: int) -> bytes:

@@ -29,13 +29,12 @@ from keystore.formats.policy import EnclavePolicy
 from keystore.formats.shares import Share, parse_shares, shares_json
 from keystore.formats.subject import Half
 from keystore.formats.validity import Validity, iso, parse_time
-from keystore.signing.ca_access import Secret
+from keystore.signing.ca_access import Secret, keep_memory_private
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
 
 _MARK = b"#"
 """Before each line of JSON: the byte that a descriptor comes with."""
-_PR_SET_DUMPABLE = 4
 _OWNER = "the launch"
 
 
@@ -109,7 +108,7 @@ def _decided(options: ProvisionOptions) -> dict[str, Any]:
 def _serve(channel: socket.socket, root: Path, base: ProvisionOptions) -> None:
     try:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher ends first, and then we do
-        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)  # nobody of the same user reads our memory
+        keep_memory_private()
         for secret in (base.access.passphrase, base.access.pin):
             _read_early(secret)
         with contextlib.suppress(EOFError, OSError):

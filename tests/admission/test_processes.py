@@ -179,7 +179,50 @@ def test_a_dds_configuration_with_security_of_its_own_is_refused(plan: Plan, tmp
             text = TALKER.format(f'<env name="{name}" value="{value.replace("<", "&lt;")}"/>')
             assert codes(plan(text)) == [Code.SECURITY_CONFIGURED], value
         assert not plan(TALKER.format(f'<env name="{name}" value="{plain}"/>')).problems
-    assert not plan(TALKER.format('<env name="CYCLONEDDS_URI" value="/no/such/file"/>')).problems
+    for name in ("CYCLONEDDS_URI", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_ENVIRONMENT_FILE"):
+        for unread in ("/no/such/file", "${HOME}", "file://${HOME}/c.xml"):
+            text = TALKER.format(f'<env name="{name}" value="{unread}"/>')
+            assert codes(plan(text)) == [Code.SECURITY_CONFIGURED], (name, unread)
+
+
+SERVER = "<dds><discoveryProtocol>CLIENT</discoveryProtocol></dds>"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "is_refused"),
+    [
+        ("CYCLONEDDS_URI", "&lt;Domain>${PART}&lt;/Domain>", True),
+        ("CYCLONEDDS_URI", "&lt;Domain>${NONE:-&lt;Security/>}&lt;/Domain>", True),
+        ("CYCLONEDDS_URI", "&lt;Domain>${PLAIN}&lt;Peers>a,b,c&lt;/Peers>&lt;/Domain>", False),
+        ("CYCLONEDDS_URI", "&lt;A/>,c.xml,&lt;B/>", True),
+        ("CYCLONEDDS_URI", "file://c.xml", True),
+        ("FASTRTPS_DEFAULT_PROFILES_FILE", "server.xml", True),
+        ("FASTRTPS_DEFAULT_PROFILES_FILE", "plain.xml", False),
+        ("FASTDDS_ENVIRONMENT_FILE", "server.json", True),
+        ("FASTDDS_ENVIRONMENT_FILE", "plain.json", False),
+    ],
+)
+def test_a_dds_configuration_is_found_where_the_middleware_finds_it(
+    plan: Plan, tmp_path: Path, name: str, value: str, is_refused: bool
+) -> None:
+    """Relative to the working directory of the node, with parts from the environment, between others."""
+    (tmp_path / "c.xml").write_text("<Domain><Security/></Domain>")
+    (tmp_path / "server.xml").write_text(SERVER)
+    (tmp_path / "plain.xml").write_text("<dds><discoveryProtocol>SIMPLE</discoveryProtocol></dds>")
+    (tmp_path / "server.json").write_text('{"ROS_DISCOVERY_SERVER": "127.0.0.1:11811"}')
+    (tmp_path / "plain.json").write_text('{"FASTDDS_STATISTICS": "x"}')
+    variables = {"PART": "&lt;Security/>", "PLAIN": "&lt;Tracing/>", name: value}
+    inner = "".join(f'<env name="{each}" value="{text}"/>' for each, text in variables.items())
+    text = TALKER.replace("<node ", f'<node cwd="{tmp_path}" ', 1).format(inner)
+    assert codes(plan(text)) == ([Code.SECURITY_CONFIGURED] if is_refused else [])
+
+
+def test_default_profiles_in_the_working_directory_of_a_node(plan: Plan, tmp_path: Path) -> None:
+    text = TALKER.replace("<node ", f'<node cwd="{tmp_path}" ', 1)
+    assert codes(plan(text.format(""))) == []
+    (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").write_text(SERVER)
+    assert codes(plan(text.format(""))) == [Code.SECURITY_CONFIGURED]
+    assert codes(plan(text.format('<env name="SKIP_DEFAULT_XML_FILE" value="1"/>'))) == []
 
 
 def test_the_launchers_own_node_needs_such_a_middleware_too(
