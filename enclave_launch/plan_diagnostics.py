@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from enclave_launch.admission.middleware import failing, mixed_pairs
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import (
+    command_needs_enclave,
     container_elsewhere,
     domains_shared,
     enclave_attribute_unused,
@@ -42,6 +44,7 @@ from enclave_launch.plan import (
 )
 from enclave_launch.policy import DerivedPolicy, RunningNode
 from enclave_launch.ros_rules.parameter_value import type_name
+from enclave_launch.ros_rules.ros2_command import instead_of, participant_command
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.subject import common_name
 
@@ -57,11 +60,20 @@ def problems(
         yield from item.refusals
         if item.enclave and item.enclave.too_deep:
             yield enclave_too_deep(name, item.enclave.too_deep, place)
+        if command := _ros2_command(item):
+            yield command_needs_enclave(name, shlex.join(command), instead_of(command), place)
         for path, why in item.process.unread_parameter_files:
             yield parameters_unknown(name, path, why, place)
     for component in components:
         if component.missing:
             yield _missing(component.missing, component.location)
+
+
+def _ros2_command(item: PlannedProcess) -> tuple[str, ...] | None:
+    process = item.process
+    if item.enclave is not None or process.kind != "executable":
+        return None
+    return participant_command(process.cmd[len(process.prefix) :], shell=process.shell)
 
 
 def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
@@ -76,7 +88,7 @@ def notes(
     """Report what matters about single processes and components."""
     for item in processes:
         process = item.process
-        if item.enclave is None and process.kind == "executable":
+        if item.enclave is None and process.kind == "executable" and not _ros2_command(item):
             yield executable_without_enclave(process.process_name, process.location)
         if process.machine:
             yield machine_elsewhere(process.process_name, process.machine, process.location)

@@ -97,6 +97,7 @@ class Code(str, Enum):
     ENCLAVE_TOO_DEEP = "enclave-too-deep", "No certificate can be made for an enclave"
     ENCLAVE_UNGRANTED = "enclave-ungranted", "The enclave of an executable has no permissions"
     MACHINE_ELSEWHERE = "machine-elsewhere", "The launch file assigns a process to another host"
+    COMMAND_NEEDS_ENCLAVE = "command-needs-enclave", "A ros2 command would start without an enclave"
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
     # of what could take an enclave away
     CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, which was not tested"

@@ -69,6 +69,12 @@ def executable_without_enclave(process: str, place: SourceLocation) -> Diagnosti
     return Diagnostic(Code.EXECUTABLE_WITHOUT_ENCLAVE, process, text, place)
 
 
+def command_needs_enclave(process: str, command: str, remedy: str, place: SourceLocation) -> Diagnostic:
+    """Refuse a command that makes a ROS participant and could not start without an enclave."""
+    text = f"{process} would run '{command}' without an enclave, and with security on it could not start"
+    return Diagnostic(Code.COMMAND_NEEDS_ENCLAVE, process, text, place, remedy)
+
+
 def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diagnostic:
     text = f"{process} is assigned to machine {machine!r}, but a launch starts everything on this host"
     return Diagnostic(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import shutil
 import socket
 import subprocess
@@ -55,6 +56,9 @@ class HostOptions(NamedTuple):
     allow_missing_packages: bool = False
     no_python: bool = False
     anonymous_seed: int | None = None
+
+
+_PACKAGE_MISSING = re.compile(r"package '([A-Za-z0-9_]+)' not found")  # as ament_index_python says it
 
 
 class CommandResult(NamedTuple):
@@ -203,6 +207,10 @@ class Host(ABC):
         if result.returncode != 0 and absent:
             self.warn(command_without_its_file(program, absent[0]))
             return CommandResult(0, f"<output of {program}, whose {absent[0]} is not installed>", "")
+        missing = _PACKAGE_MISSING.search(result.stderr or result.stdout) if result.returncode else None
+        if missing and missing[1] not in ament_index.installed_packages(self.prefixes()):
+            self.warn(command_without_its_file(program, f"package {missing[1]}"))
+            return CommandResult(0, f"<output of {program}, whose package {missing[1]} is not installed>", "")
         return result
 
     def _run_command(self, command: Sequence[str], merge_stderr: bool, at_event: bool) -> CommandResult:

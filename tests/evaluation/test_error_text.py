@@ -181,6 +181,31 @@ def test_a_command_that_fails_on_a_file_of_a_missing_package_gives_a_placeholder
     )
 
 
+@pytest.mark.parametrize(("package", "is_placeholder"), [("no_such_camera", True), ("here", False)])
+def test_a_command_that_misses_a_package_itself_gives_a_placeholder_when_packages_may_be_missing(
+    package: str, is_placeholder: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As xacro does for a model that includes one of a package which is not installed."""
+    index = tmp_path / "prefix/share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    (index / "here").touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+    program = tmp_path / "model"
+    program.write_text(
+        f"#!/bin/sh\necho \"error: package '{package}' not found, searching: []\" >&2\nexit 2\n"
+    )
+    program.chmod(0o755)
+    text = XML.format(f"<executable cmd=\"talker $(command '{program}')\"/>")
+    assert "executed command failed" in message(tmp_path, "a.launch.xml", text)
+    if not is_placeholder:
+        assert "executed command failed" in message(
+            tmp_path, "a.launch.xml", text, allow_missing_packages=True
+        )
+        return
+    found = evaluate(tmp_path / "a.launch.xml", host=PlanHost(allow_missing_packages=True))
+    assert f"whose package {package} is not installed>" in " ".join(found.processes[0].cmd)
+
+
 def test_a_command_that_fails_otherwise_is_an_error_when_packages_may_be_missing(tmp_path: Path) -> None:
     text = XML.format("<executable cmd=\"talker $(command 'cat /no/such/arm.urdf')\"/>")
     assert "executed command failed" in message(tmp_path, "a.launch.xml", text, allow_missing_packages=True)

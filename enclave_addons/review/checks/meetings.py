@@ -57,7 +57,7 @@ def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
 
 
 _NAMED = 5
-_WITHOUT_INTERFACES = (Code.EXECUTABLE_WITHOUT_ENCLAVE, Code.ENCLAVE_UNGRANTED)
+_WITHOUT_INTERFACES = (Code.COMMAND_NEEDS_ENCLAVE, Code.EXECUTABLE_WITHOUT_ENCLAVE, Code.ENCLAVE_UNGRANTED)
 """Said of an ``executable``: a simulator, a player of a bag."""
 
 
