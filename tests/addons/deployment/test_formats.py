@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
 import subprocess
 from datetime import timedelta
@@ -169,6 +170,32 @@ def test_a_workspace_below_home_can_be_read_and_no_other_folder_there(
     opened = Unit(tmp_path / "b/out/ros-robot-ear.service")
     assert opened.one("ProtectHome") == "tmpfs" and opened.all("BindReadOnlyPaths") == ["/home/me/ws"]
     assert "/ear reads below a home directory: /home/me/ws is left readable" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "place", ["/k;>hit", "/k$(>hit)", "/k`>hit`", "/k';>hit;'", '/k";>hit;"', "/k&&>hit"]
+)
+def test_the_place_of_the_keystore_is_no_command(tmp_path: Path, place: str) -> None:
+    """The scripts before a unit run as root; here they are run by a shell, in a folder that they could change."""
+    out = made("systemd", tmp_path, TALK, "--host-keystore", place)
+    scripts = [
+        words(line.lstrip("+"))[2]
+        for path in out.glob("*.service")
+        for line in Unit(path).all("ExecStartPre")
+    ]
+    assert len(scripts) >= 4 and all(">hit" in script for script in scripts)
+    runs = tmp_path / "runs"
+    (runs / "credentials").mkdir(parents=True)
+    environment = {
+        **os.environ,
+        "RUNTIME_DIRECTORY": str(runs / "run"),
+        "CREDENTIALS_DIRECTORY": str(runs / "credentials"),
+    }
+    for script in scripts:
+        subprocess.run(
+            ["/bin/sh", "-c", script], cwd=runs, env=environment, capture_output=True, timeout=60, check=False
+        )
+    assert not list(runs.rglob("hit"))
 
 
 def test_words_and_values_come_through_systemds_syntax(tmp_path: Path) -> None:
