@@ -159,8 +159,8 @@ def upstream_name(module: str, name: str) -> str:
 
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
-FALLBACK_NAMES = ("lifecycle_msgs", "nav2_common", "xacro")
-"""Taken over only where the package is not installed: many launch files of robots import these three."""
+FALLBACK_NAMES = ("lifecycle_msgs", "nav2_common", "rclpy", "xacro")
+"""Taken over only where the package is not installed: many launch files of robots import these."""
 
 _depth = 0
 _guests: dict[str, ModuleType] = {}  # modules of others that were imported with our classes

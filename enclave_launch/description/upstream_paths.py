@@ -262,6 +262,9 @@ PATHS: dict[str, dict[str, str]] = {
         "replace_string": "nav2_common: ReplaceString",
         "rewritten_yaml": "nav2_common: RewrittenYaml",
     },
+    "rclpy": {
+        "logging": "rclpy_logging: | LoggingSeverity get_logger get_logger_effective_level set_logger_level",
+    },
     "xacro": {
         "": "xacro: parse process_doc process_file",
     },

@@ -1,4 +1,4 @@
-"""Python launch files that import ``nav2_common`` or ``xacro``, on a machine where neither is installed."""
+"""Python launch files that import ``nav2_common``, ``rclpy`` or ``xacro``, on a machine where none is installed."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PLAIN = {"sim": False, "scan": "front", "frames.scan": "deep", "frames.ids": ("m
 @pytest.fixture(autouse=True)
 def as_if_never_imported() -> Iterator[None]:
     yield
-    for name in [name for name in sys.modules if name.partition(".")[0] in ("nav2_common", "xacro")]:
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("nav2_common", "rclpy", "xacro")]:
         del sys.modules[name]
 
 
@@ -203,3 +203,17 @@ def test_without_the_program_there_is_an_error_or_a_placeholder(
     found = launched(text, syntax="py", allow_missing_packages=True)
     assert found.processes[0].parameters == {"p": "<output of xacro, which is not installed>"}
     assert "program-not-installed" in [str(warning.code) for warning in found.warnings]
+
+
+def test_a_launch_file_logs_with_rclpy(launched: Evaluate, caplog: pytest.LogCaptureFixture) -> None:
+    before = (
+        "import rclpy.logging; log = rclpy.logging.get_logger('bringup'); log.get_child('arm').warn('slow')"
+    )
+    assert launched(FILE.format(before=before, parameters=""), syntax="py").processes[0].name == "n"
+    assert ("bringup.arm", "slow") in [(each.name, each.getMessage()) for each in caplog.records]
+
+
+@pytest.mark.parametrize("before", ["from rclpy.node import Node as RosNode", "import rclpy; rclpy.init()"])
+def test_nothing_else_of_rclpy_is_there(launched: Evaluate, before: str) -> None:
+    with pytest.raises(EvaluationError, match="rclpy"):
+        launched(FILE.format(before=before, parameters=""), syntax="py")
