@@ -1,8 +1,7 @@
 """``./dev fuzz [TARGET [MINUTES]]``: every target, or one, in turn until the time is over (default: 10 minutes).
 
 The first input at which a parser does something else than give a value or refuse is printed, made as small as possible;
-the exit status is then 1. ``cpp-programs`` compiles and runs random programs and prints the first of which inference
-says something false, or misses something silently. ``dds-documents`` asks Cyclone DDS and Fast DDS of changed
+the exit status is then 1. ``dds-documents`` asks Cyclone DDS and Fast DDS of changed
 documents, and prints the first that ``verify`` calls good though one of them grants something else than we read in it.
 """
 
@@ -17,21 +16,18 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, given, seed, settings
 
-from tests.addons.inference.cpp.random_programs.generator import program
-from tests.addons.inference.cpp.random_programs.judge import judged, runs
 from tests.dds.conftest import cyclone_probe, domain, fastdds_probe
 from tests.dds.differential import Laboratory
 from tests.fuzz.inputs import damaged
 from tests.fuzz.targets import Target, targets
 
-PROGRAMS, BATCH = "cpp-programs", 30
 DDS_DOCUMENTS, DOCUMENTS = "dds-documents", 200
 ROUND = 1_000  # inputs of one target before it is another one's turn
 
 
 def main(arguments: list[str]) -> int:
     known = targets()
-    others = {PROGRAMS: random_programs, DDS_DOCUMENTS: dds_documents}
+    others = {DDS_DOCUMENTS: dds_documents}
     names = [*known, *others]
     chosen = arguments[:1] or names
     if chosen[0] not in names:
@@ -49,17 +45,6 @@ def main(arguments: list[str]) -> int:
             print(f"\r{count} inputs, last {name:20}", end="", file=sys.stderr, flush=True)
     print(f"\n{count} inputs, no fault", file=sys.stderr)
     return 0
-
-
-def random_programs() -> int:
-    """Judge some programs; ``AssertionError`` with the source of the first that is wrong."""
-    seeds = [random.randrange(2**32) for _ in range(BATCH)]
-    programs = [program(each) for each in seeds]
-    with tempfile.TemporaryDirectory() as folder:
-        for each, one, made in zip(seeds, programs, runs(programs, Path(folder), range(40)), strict=True):
-            verdict = judged(one, made, Path(folder) / str(each))
-            assert not verdict.silent and not verdict.false, f"{each}: {verdict}\n{one.files}"
-    return BATCH
 
 
 def dds_documents() -> int:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from enclave_addons.inference.cpp.running.values import BOTTOM, Notes, Text, Value, join
+from enclave_addons.inference.cpp.engine.values import BOTTOM, Text, Value, join
 from nodl.dependence import ALWAYS, When
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
-
-Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the preprocessor decides elsewhere
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,13 @@ class AllocatedNode:
     ``parameter_services``: they, or its parameter events, are not certainly switched off."""
 
     source: SourceRef
-    parameters: Notes
-    overrides: Notes
-    set_values: Notes  # what the program gives parameters later
     lifecycle: bool
+    parameters: dict[str, Value] = field(default_factory=dict)
+    overrides: dict[str, Value] = field(default_factory=dict)
+    set_values: dict[str, Value] = field(default_factory=dict)  # what the program gives parameters later
     names: Value = BOTTOM
     namespaces: Value = BOTTOM
-    endpoints: dict[PossibleEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
+    endpoints: dict[PossibleEndpoint, None] = field(default_factory=dict)
     unconditional: set[PossibleEndpoint] = field(default_factory=set)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)

@@ -6,10 +6,11 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from enclave_addons.inference.cpp.engine.frames import Frame
+from enclave_addons.inference.cpp.engine.machine import Machine, registered
+from enclave_addons.inference.cpp.engine.values import BOTTOM, Obj, Value
 from enclave_addons.inference.cpp.findings import AllocatedNode
 from enclave_addons.inference.cpp.reading.type_names import Type, ros_type
-from enclave_addons.inference.cpp.running.machine import Frame, Machine, registered
-from enclave_addons.inference.cpp.running.values import BOTTOM, Obj, Value
 from enclave_addons.inference.cpp.syntax import Node
 
 

@@ -10,9 +10,18 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from enclave_addons.inference.answers.folder import digest_of, digest_of_content
+from enclave_addons.inference.cpp.engine import calls, expressions, statements  # noqa: F401 (how each runs)
+from enclave_addons.inference.cpp.engine.callbacks import run_callbacks
+from enclave_addons.inference.cpp.engine.check import SiteAnswer, account
+from enclave_addons.inference.cpp.engine.frames import Frame
+from enclave_addons.inference.cpp.engine.invocation import invoke
+from enclave_addons.inference.cpp.engine.machine import Machine, StepLimitExceeded
+from enclave_addons.inference.cpp.engine.objects import construct, initial_value
+from enclave_addons.inference.cpp.engine.places import static_place
+from enclave_addons.inference.cpp.engine.sites import CREATES
+from enclave_addons.inference.cpp.engine.values import Seq, Value, unknown
 from enclave_addons.inference.cpp.entry import CppSupportMissing, Entry, failure
 from enclave_addons.inference.cpp.findings import AllocatedNode
-from enclave_addons.inference.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces
 from enclave_addons.inference.cpp.models.loaded import host_of, load
 from enclave_addons.inference.cpp.models.nodes import ARGUMENT
 from enclave_addons.inference.cpp.reading.built import Definitions, named_in
@@ -23,7 +32,6 @@ from enclave_addons.inference.cpp.reading.declarations import (
     FileIndex,
     Function,
     FunctionParameter,
-    Global,
 )
 from enclave_addons.inference.cpp.reading.known_headers import KNOWN_HEADERS
 from enclave_addons.inference.cpp.reading.names import Names
@@ -31,14 +39,6 @@ from enclave_addons.inference.cpp.reading.parameter_library import listener_of
 from enclave_addons.inference.cpp.reading.preprocess import Include, Preprocessed, preprocess
 from enclave_addons.inference.cpp.reading.project import SourcePackage, Workspace, sources_of, targets_of
 from enclave_addons.inference.cpp.reading.type_names import Type
-from enclave_addons.inference.cpp.running import calls, expressions, invocation, loops, statements  # noqa: F401 (how each runs)
-from enclave_addons.inference.cpp.running.callbacks import run_callbacks
-from enclave_addons.inference.cpp.running.constructors import construct
-from enclave_addons.inference.cpp.running.invocation import invoke
-from enclave_addons.inference.cpp.running.machine import Frame, Machine, StepLimitExceeded
-from enclave_addons.inference.cpp.running.values import Seq, Value, unknown
-from enclave_addons.inference.cpp.running.variables import constant, static_member
-from enclave_addons.inference.cpp.syntax import line_of
 from enclave_addons.inference.start import Start
 from enclave_common.files import read_bytes
 from nodl.source_ref import SourceRef
@@ -229,7 +229,7 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
     names.depends = frozenset().union(
         *(p.depends for i in files if (p := sources.workspace.package_of(i.file)) is not None)
     )
-    run = Machine(names, start, invocation)
+    run = Machine(names, start, _Calls())
     try:
         _start(run, entry)
         run_callbacks(run)
@@ -276,38 +276,28 @@ def _start(run: Machine, entry: Entry) -> None:
 
 
 def _globals(run: Machine, entry: Entry) -> None:
-    """Make variables outside of functions, as happens before main."""
+    """Make objects outside of functions, as happens before main."""
     seen = (name for file in entry.files for name in (*sorted(run.names.visible(file) - {file}), file))
     for index in (run.names.files[name] for name in dict.fromkeys(seen) if name in run.names.files):
-        for cls in (each for found in index.classes.values() for each in found):
-            for name, member in cls.fields.items():
-                if member.static and member.default is not None and not cls.templates and not cls.specialises:
-                    static_member(run, cls, name)
         listed = (each for found in index.globals.values() for each in found)
         for each in sorted(listed, key=lambda found: found.node.start_byte):
-            mark = run.store.mark()
             kind = run.names.resolve(each.type, each.scope, each.file)
-            if run.names.class_of(kind, each.scope, each.file) is not None or each.value is not None:
-                constant(run, "::".join((*each.scope, each.name)), Frame(each.file, each.scope))
-            _check_order(run, each, mark)
+            known = run.names.class_of(kind, each.scope, each.file) is not None
+            if known or (each.value is not None and run.leading.code(each.value)):
+                static_place(run, "::".join((*each.scope, each.name)), (), each.file)
 
 
-def _check_order(run: Machine, initialised: Global, mark: int) -> None:
-    """Check that none of two files writes to the other while it is initialised: nobody knows which is first
-    ([basic.start.dynamic]).
-    """
-    for cell in run.store.changes(mark):
-        owner = cell[0]
-        if isinstance(owner, Global) and owner.file.file not in run.names.visible(initialised.file.file):
-            place = SourceRef(initialised.file.file, line_of(initialised.node))
-            why = f"{owner.name} is changed before main by another file than its own: in which order is not known"
-            run.gap_at(place, why)
+class _Calls:
+    """How functions are called and variables begin, for modules that these stand on."""
+
+    invoke = staticmethod(invoke)
+    initial_value = staticmethod(initial_value)
 
 
 def _run_main(run: Machine, function: Function) -> None:
     words: Value = (Seq((unknown(ARGUMENT),), open=True),)
     arguments = [unknown("the number of arguments"), words][: len(function.parameters)]
-    invoke(run, function, None, arguments, function.node, Frame(function.file, function.scope), ())
+    invoke(run, function, None, arguments, function.node, Frame(function.file, function.scope))
 
 
 def _construct_entry(run: Machine, entry: Entry) -> None:
@@ -332,7 +322,7 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
 def _entry_arguments(run: Machine, cls: Class) -> list[Value]:
     """Return what a container gives: node options, to the constructor that takes only these; else it is not known."""
     constructors = run.names.find_methods(cls, cls.name)
-    options: Value = (run.obj(("options", cls), Type("rclcpp::NodeOptions")),)
+    options: Value = (run.object(("options", cls), Type("rclcpp::NodeOptions")),)
     required = {c: [p for p in c.parameters if p.default is None] for c in constructors}
     one = [c for c in constructors if len(required[c]) <= 1 and any(map(_is_options, c.parameters))]
     if one:
@@ -354,7 +344,8 @@ def _findings(run: Machine, sources: Sources) -> ProgramFindings:
             record.arguments += run.global_arguments
             record.use_global_arguments = False
     for (file, start), (source, what, name) in run.unset.items():
-        if start not in run.handled.get(file, ()):
+        leads = name in run.leading.words or CREATES.fullmatch(name)
+        if leads and start not in run.handled.get(file, ()):
             run.gap_at(source, f"{what} was never seen to be set: what {name}() makes is not known")
     for cls in run.names.doubts.values():
         why = f"which specialisation of {cls.qualified} is meant is not known"
@@ -382,17 +373,22 @@ def _text_gaps(run: Machine, index: FileIndex) -> None:
         called = [
             each for word in _CALLED.findall(written) for each in run.names.functions_by_name.get(word, ())
         ]
-        if CREATES.search(written) or any(map(run.makes_interfaces, called)):
+        if CREATES.search(written) or any(map(run.leading.function, called)):
             run.gap_at(SourceRef(index.file, line), "this C++ could not be parsed")
+    lines = index.source.text.split("\n")
     for line, name in index.source.unknown_macros:
+        if not _NODE.search(lines[line - 1]):
+            continue
         why = f"the macro {name} is not in reach: what it stands for is not known"
         run.gap_at(SourceRef(index.file, line), why)
     for line, name, body in index.source.open_macros:
-        if leads_to_interfaces(run, frozenset(_WORD.findall(body))):
+        if run.leading.of_words(frozenset(_WORD.findall(body))):
             why = f"what the macro {name} stands for here is not known; it may make interfaces"
             run.gap_at(SourceRef(index.file, line), why)
 
 
+_NODE = re.compile(r"\b(?:this|\w*[Nn]ode\w*)\b")
+"""What a macro is given that may make interfaces."""
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _CALLED = re.compile(r"([A-Za-z_]\w*)\s*\(")
 

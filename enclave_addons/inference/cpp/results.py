@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import pairwise
 
+from enclave_addons.inference.cpp.engine.values import NodeNamePart, Text, Value, concatenated, plain
 from enclave_addons.inference.cpp.entry import FixedMapping
-from enclave_addons.inference.cpp.findings import AllocatedNode, Condition, PossibleEndpoint
+from enclave_addons.inference.cpp.findings import AllocatedNode, PossibleEndpoint
 from enclave_addons.inference.cpp.program import ProgramFindings
-from enclave_addons.inference.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
 from enclave_addons.inference.kernel.results import UNDECIDED, certainty_of, own_name
 from enclave_addons.inference.start import Start
 from nodl.dependence import Dependence, Variation, When
@@ -23,6 +24,7 @@ from nodl.node_interface import (
     NodeInterface,
 )
 from nodl.remap import InvalidRemapRuleError, parse_rule
+from nodl.source_ref import SourceRef
 
 
 def interfaces_of(
@@ -42,8 +44,33 @@ def interfaces_of(
         given = _given_to_the_first(findings, start) if record is not findings.nodes[0] else {}
         found += [_opened(each, unreached, given) for each in _of_node(record, package, executable, plugin)]
     if found:
-        found[0] = found[0]._replace(gaps=tuple(dict.fromkeys((*found[0].gaps, *program_gaps(findings)))))
-    return found
+        found[0] = found[0]._replace(gaps=(*found[0].gaps, *_program_gaps(findings)))
+    return [each._replace(gaps=grouped(each.gaps)) for each in found]
+
+
+MAX_CAUSES = 10
+"""More gaps with different causes are one: the program is not followed."""
+_SHOWN = 3
+
+
+def grouped(gaps: Sequence[Gap]) -> tuple[Gap, ...]:
+    """Return one gap for each cause, with the number of its places and the first of them."""
+    places: dict[str, dict[SourceRef, None]] = {}
+    for gap in gaps:
+        places.setdefault(gap.why, {}).setdefault(gap.source)
+    if len(places) > MAX_CAUSES:
+        why, first = next(iter(places.items()))
+        number = sum(map(len, places.values()))
+        cure = "write its interfaces in a manifest, or record it"
+        return (
+            Gap(next(iter(first)), f"this program is not followed: {number} places, first: {why} ({cure})"),
+        )
+    return tuple(_of_cause(why, list(found)) for why, found in places.items())
+
+
+def _of_cause(why: str, places: Sequence[SourceRef]) -> Gap:
+    others = ", ".join(f"{os.path.basename(each.file)}:{each.line}" for each in places[1:_SHOWN])
+    return Gap(places[0], f"{why} ({len(places)} places, also {others})" if others else why)
 
 
 def _unreached(record: AllocatedNode, findings: ProgramFindings) -> set[str]:
@@ -92,8 +119,12 @@ def _reached(part: Part, unreached: Container[str], given: Mapping[str, object])
     return texts[0] if len(texts) == 1 else UnknownPart(f"parameter {part.name} of a node beside it")
 
 
-def program_gaps(findings: ProgramFindings) -> list[Gap]:
-    """Return what belongs to no single node, and every place without a result."""
+def program_gaps(findings: ProgramFindings) -> tuple[Gap, ...]:
+    """Return what belongs to no single node, and every place without a result, one gap for each cause."""
+    return grouped(_program_gaps(findings))
+
+
+def _program_gaps(findings: ProgramFindings) -> list[Gap]:
     gaps = [Gap(source, why) for source, why in findings.gaps]
     gaps += [Gap(answer.source, answer.reason) for answer in findings.answers if not answer.dead]
     if findings.from_default and findings.nodes:
@@ -111,10 +142,8 @@ def _of_node(
     record: AllocatedNode, package: str | None, executable: str | None, plugin: str | None
 ) -> list[NodeInterface]:
     gaps = [Gap(source, why) for source, why in record.gaps]
-    gaps += _conditional_gaps(record)
     rules = _rules(record, gaps)
-    endpoints = tuple(dict.fromkeys(e for found, when in record.endpoints.items() if _is_certain(found, when, record)
-                                    for e in _endpoint(found, record)))  # fmt: skip
+    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoint(found, record)))
     unnamed = [endpoint for endpoint in endpoints if not endpoint.name.parts]
     endpoints = tuple(endpoint for endpoint in endpoints if endpoint.name.parts)
     for endpoint in unnamed:  # rcl refuses an empty name, so that nothing is made under it
@@ -229,41 +258,6 @@ def _parts(text: Text, record: AllocatedNode) -> Iterator[Part]:
             known = names[0] if len(names) == 1 else None
             node = f"the {part.what} of node {known or 'that is not known'}"
             yield UnknownPart(f"{node}, which the launch file may change")
-
-
-# --- what the build decides -------------------------------------------------------------------------------------
-
-
-def _is_certain(found: PossibleEndpoint, when: list[tuple[Condition, ...]], record: AllocatedNode) -> bool:
-    """Return whether it is made whatever the build says: without a condition, or on every side of one."""
-    if any(not conditions for conditions in when):
-        return True
-    same = [c for other, given in record.endpoints.items() if _alike(other, found) for c in given]
-    if any(not conditions for conditions in same):
-        return True
-    sides: dict[tuple[str, int], set[str]] = {}
-    for conditions in same:
-        if len(conditions) == 1:
-            file, line, symbol = conditions[0]
-            sides.setdefault((file, line), set()).add(symbol)
-    return any(
-        any(s.startswith("else of ") for s in symbols) and len(symbols) > 1 for symbols in sides.values()
-    )
-
-
-def _alike(first: PossibleEndpoint, second: PossibleEndpoint) -> bool:
-    return (first.kind, first.name, first.type) == (second.kind, second.name, second.type)
-
-
-def _conditional_gaps(record: AllocatedNode) -> list[Gap]:
-    gaps = []
-    for found, when in record.endpoints.items():
-        if not _is_certain(found, when, record):
-            kind, symbol = found.kind.value.replace("_", " "), when[0][-1][2]
-            for template in _templates(found.name, record):
-                why = f"{kind} {template} is made only where the build says {symbol}"
-                gaps.append(Gap(found.source, why))
-    return gaps
 
 
 # --- remap rules in code ----------------------------------------------------------------------------------------

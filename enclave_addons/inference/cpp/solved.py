@@ -54,7 +54,7 @@ def _solved(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None)
     nodes = interfaces_of(findings, *key, start)
     solved = Solved(
         nodes=tuple(nodes),
-        gaps=tuple(program_gaps(findings)),
+        gaps=program_gaps(findings),
         dead=tuple(Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead),
         classes=tuple(sorted(findings.classes)),
         consulted=findings.consulted or (start is not None and nodes != interfaces_of(findings, *key)),

@@ -235,6 +235,15 @@ def _unmade(
     indexes = [
         i for f in files if not _is_test(f, workspace) and (i := sources.index(f, UNBUILT)) is not None
     ]
+    headers = dict.fromkeys(name for index in indexes for name in index.source.includes)
+    packages = {p.name for index in indexes if (p := workspace.package_of(index.file)) is not None}
+    indexes += [
+        i
+        for name in headers
+        if name not in files
+        and getattr(workspace.package_of(name), "name", None) in packages
+        and (i := sources.index(name, UNBUILT)) is not None
+    ]
     names = Names(indexes)
     parents = {
         base.qualified

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import Value, literal, unknown
 from enclave_addons.inference.cpp.libraries import Call, library_function, node_class, node_method
 from enclave_addons.inference.cpp.models.nodes import become_node
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import Value, literal, unknown
 from nodl.dependence import CONTROLLER
 
 CONTROLLERS = tuple(

@@ -5,14 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from enclave_addons.inference.cpp.findings import AllocatedNode, Follows
-from enclave_addons.inference.cpp.libraries import Call, library_class, library_function, library_method
-from enclave_addons.inference.cpp.models.interfaces import PUB, SRV, SUB, node_of, owner_in, texts_in
-from enclave_addons.inference.cpp.models.parameters import parameter_names
-from enclave_addons.inference.cpp.reading.type_names import Type
-from enclave_addons.inference.cpp.running.launch_values import text_of
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import (
+from enclave_addons.inference.cpp.engine.launch_values import text_of
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import (
     Atom,
     Obj,
     Param,
@@ -23,6 +18,11 @@ from enclave_addons.inference.cpp.running.values import (
     literal,
     unknown,
 )
+from enclave_addons.inference.cpp.findings import AllocatedNode, Follows
+from enclave_addons.inference.cpp.libraries import Call, library_class, library_function, library_method
+from enclave_addons.inference.cpp.models.interfaces import PUB, SRV, SUB, node_of, owner_in, texts_in
+from enclave_addons.inference.cpp.models.parameters import parameter_names
+from enclave_addons.inference.cpp.reading.type_names import Type
 from nodl.dependence import When
 
 _IMAGE, _INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
@@ -78,7 +78,7 @@ def _image(what: str, run: Machine, call: Call, place: int = 3) -> Value:
         run.gap(call.node, call.frame, f"the node that image_transport makes a {what} on is not known")
         return unknown("an image interface")
     base = texts[0] if texts else unknown("a topic that is not given")
-    run.later(call.values, call.frame)
+    run.later(call.values)
     if what in ("publisher", "camera publisher"):
         _image_publisher(run, owner.node, base, call)
     else:
@@ -90,7 +90,7 @@ def _image(what: str, run: Machine, call: Call, place: int = 3) -> Value:
             info = _info_topic((topic,))
             run.endpoint(owner.node, kind, info, _INFO, call, Follows("camera_info", topic))
     name = what.replace("subscription", "subscriber").title().replace(" ", "")
-    return (run.obj(call.key("image"), Type(f"image_transport::{name}"), heap=True),)
+    return (run.object(call.key("image"), Type(f"image_transport::{name}"), heap=True),)
 
 
 def _image_subscription(

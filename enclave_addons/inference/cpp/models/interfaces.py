@@ -9,12 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from enclave_addons.inference.cpp.findings import AllocatedNode
-from enclave_addons.inference.cpp.libraries import Call, library_function, library_method, node_method
-from enclave_addons.inference.cpp.reading.type_names import NO_TYPE, Type, ros_type
-from enclave_addons.inference.cpp.running.contents import nodes_in
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import (
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import (
     BOTTOM,
     Obj,
     Param,
@@ -22,9 +18,13 @@ from enclave_addons.inference.cpp.running.values import (
     Value,
     concatenated,
     literal,
+    nodes_in,
     plain,
     unknown,
 )
+from enclave_addons.inference.cpp.findings import AllocatedNode
+from enclave_addons.inference.cpp.libraries import Call, library_function, library_method, node_method
+from enclave_addons.inference.cpp.reading.type_names import NO_TYPE, Type, ros_type
 from nodl.node_interface import EndpointKind
 
 PUB, SUB = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
@@ -61,10 +61,10 @@ def add(run: Machine, owner: Obj, kind: EndpointKind, name: Value, type_name: st
     record = owner.node
     assert record is not None
     run.endpoint(record, kind, name, type_name, call)
-    made = run.obj(call.key("interface"), Type(f"rclcpp::{kind.value}"))
+    made = run.object(call.key("interface"), Type(f"rclcpp::{kind.value}"))
     made.heap = True
     made.data.update(name=name, kind=kind, type=type_name, record=record)
-    run.later(call.values, call.frame)
+    run.later(call.values)
     return (made,)
 
 

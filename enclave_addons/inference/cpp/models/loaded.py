@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from enclave_addons.inference.cpp.engine.frames import Frame
+from enclave_addons.inference.cpp.engine.invocation import HOOKS
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import Bound, Obj, Value, literal, unknown
 from enclave_addons.inference.cpp.libraries import Call, library_class, library_method
 from enclave_addons.inference.cpp.models.nodes import become_node
 from enclave_addons.inference.cpp.reading.declarations import Class, FunctionParameter
 from enclave_addons.inference.cpp.reading.type_names import Type
-from enclave_addons.inference.cpp.running.invocation import HOOKS
-from enclave_addons.inference.cpp.running.machine import Frame, Machine
-from enclave_addons.inference.cpp.running.values import Bound, Obj, Value, literal, unknown
 from nodl.dependence import COMPONENT, HOST
 
 _LAYER = "nav2_costmap_2d::Layer"
@@ -47,7 +48,7 @@ def _base_of_hardware(run: Machine, call: Call) -> Value:
 
 def _node_of_component(run: Machine, call: Call) -> Value:
     """Return the node of the component itself, which releases have since jazzy."""
-    node = run.obj((COMPONENT, call.this), Type("rclcpp::Node"))
+    node = run.object((COMPONENT, call.this), Type("rclcpp::Node"))
     if node not in run.nodes:
         become_node(run, replace(call, receiver=node, values=[literal(COMPONENT)]))
     return (node,)
@@ -74,7 +75,7 @@ def _silent_in_rviz(run: Machine, call: Call) -> None:
 
 
 def _context(run: Machine, plugin: Obj) -> Value:
-    return (run.obj((_CONTEXT, plugin), Type(_CONTEXT)),)
+    return (run.object((_CONTEXT, plugin), Type(_CONTEXT)),)
 
 
 @library_method(_RVIZ[0], "getDisplayContext")
@@ -85,7 +86,7 @@ def _context_of_panel(run: Machine, call: Call) -> Value:
 @library_method(_CONTEXT, "getRosNodeAbstraction")
 @library_method(_NODE_OF_RVIZ, "lock")
 def _abstraction(run: Machine, call: Call) -> Value:
-    return (run.obj((_NODE_OF_RVIZ,), Type(_NODE_OF_RVIZ)),)
+    return (run.object((_NODE_OF_RVIZ,), Type(_NODE_OF_RVIZ)),)
 
 
 @library_method(_NODE_OF_RVIZ, "get_raw_node")
@@ -96,7 +97,7 @@ def _node_of_rviz(run: Machine, call: Call) -> Value:
 
 def host_of(run: Machine, cls: Class, frame: Frame) -> Obj:
     """Make the node that loads an object of ``cls``."""
-    host = run.obj((HOST, cls), Type(_LIFECYCLE))
+    host = run.object((HOST, cls), Type(_LIFECYCLE))
     become_node(run, Call(cls.node, frame, [literal(HOST)], receiver=host), lifecycle=True)
     return host
 
@@ -116,16 +117,14 @@ def load(run: Machine, made: Value, host: Obj, instance: str) -> None:
             for method in run.names.find_methods(plugin.cls, name):
                 if any(map(_takes_node, method.parameters)):
                     given = tuple(_given(each, host, instance) for each in method.parameters)
-                    frame = Frame(method.file, method.scope, None, plugin)
-                    run.callbacks[method, (plugin, ())] = (Bound(method, plugin, given), frame)
+                    run.callbacks[Bound(method, plugin, given)] = False
 
 
 def _expect_calls(run: Machine, plugin: Obj, cls: Class, names: tuple[str, ...]) -> None:
     """Let the host call methods of these names, whenever it likes."""
     for method in (each for name in names for each in run.names.find_methods(cls, name)):
         given = tuple(unknown(f"the argument {each.name}") for each in method.parameters)
-        frame = Frame(method.file, method.scope, None, plugin)
-        run.callbacks[method, (plugin, ())] = (Bound(method, plugin, given), frame)
+        run.callbacks[Bound(method, plugin, given)] = False
 
 
 def _given(parameter: FunctionParameter, host: Obj, instance: str) -> Value:

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from enclave_addons.inference.cpp.engine.launch_values import text_of
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import Value, concatenated, literal, unknown
 from enclave_addons.inference.cpp.findings import AllocatedNode
 from enclave_addons.inference.cpp.libraries import Call, library_class, library_method
 from enclave_addons.inference.cpp.models.interfaces import CALL, CLI, PUB, SUB, named_in, owner_in
@@ -15,9 +18,6 @@ from enclave_addons.inference.cpp.models.nodes import become_node
 from enclave_addons.inference.cpp.models.parameters import read
 from enclave_addons.inference.cpp.models.table import listener
 from enclave_addons.inference.cpp.reading.type_names import Type
-from enclave_addons.inference.cpp.running.launch_values import text_of
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import Value, concatenated, literal, unknown
 
 _MOVE_GROUP = "moveit::planning_interface::MoveGroupInterface"
 _DESCRIPTION = "robot_description"
@@ -70,7 +70,7 @@ def _described(run: Machine, call: Call) -> AllocatedNode | None:
     for parameter in (_DESCRIPTION, f"{_DESCRIPTION}_semantic"):
         if any(text_of(run, atom) for atom in read(run, record, literal(parameter))):
             continue
-        waiting = run.obj((parameter, record), Type("rclcpp::Node"), heap=True)
+        waiting = run.object((parameter, record), Type("rclcpp::Node"), heap=True)
         given = [concatenated(record.names, literal(f"_ssp_{parameter}")), record.namespaces or literal("")]
         made = become_node(run, replace(call, values=given, receiver=waiting))
         run.endpoint(made, SUB, literal(parameter), "std_msgs/msg/String", call)

@@ -7,24 +7,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from enclave_addons.inference.cpp.findings import AllocatedNode
-from enclave_addons.inference.cpp.libraries import (
-    Call,
-    library_class,
-    library_function,
-    library_method,
-    node_class,
-    node_method,
-)
-from enclave_addons.inference.cpp.running.contents import nodes_in
-from enclave_addons.inference.cpp.running.launch_values import text_of
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import (
+from enclave_addons.inference.cpp.engine.launch_values import text_of
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import (
     BOTTOM,
+    NULL,
     Atom,
     Map,
     NodeNamePart,
-    Notes,
     Obj,
     Param,
     Seq,
@@ -33,8 +23,18 @@ from enclave_addons.inference.cpp.running.values import (
     Value,
     join,
     literal,
+    nodes_in,
     truth,
     unknown,
+)
+from enclave_addons.inference.cpp.findings import AllocatedNode
+from enclave_addons.inference.cpp.libraries import (
+    Call,
+    library_class,
+    library_function,
+    library_method,
+    node_class,
+    node_method,
 )
 from enclave_addons.inference.cpp.syntax import field_of, text
 
@@ -46,11 +46,9 @@ def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> Allocat
     this = call.this
     record = run.nodes.get(this)
     if record is None:
-        source, log = run.place(call.node, call.frame), run.store.log
-        record = AllocatedNode(source, Notes(log), Notes(log), Notes(log), lifecycle)
+        record = AllocatedNode(run.place(call.node, call.frame), lifecycle)
         run.nodes[this] = record
-        run.size["nodes"] = len(run.nodes)
-    this.node, this.is_node = record, True
+        this.node, this.is_node = record, True
     record.names = join(record.names, call.value(0) or unknown("a name that is not given"))
     rest = call.values[1:]
     if rest and not _is_options(rest[0]):
@@ -63,8 +61,6 @@ def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> Allocat
         record.parameter_services = True
     if lifecycle and len(rest) > 1 and truth(rest[1]) is False:
         record.lifecycle = False
-    for condition in run.conditions(call.node, call.frame):
-        record.gap(record.source, f"this node is made only where the build says {condition[2]}")
     return record
 
 
@@ -196,7 +192,7 @@ def _resolved(run: Machine, call: Call) -> Value:
 
 
 def _nothing(run: Machine, call: Call) -> Value:
-    run.later(call.values, call.frame)
+    run.later(call.values)
     return unknown("a value that rclcpp gives")
 
 
@@ -266,7 +262,9 @@ def _init(run: Machine, call: Call) -> Value:
     With arguments of the program's own making those of the launch are not used; they are rules for all nodes.
     """
     for atom in call.value(1) or ((Seq(()),) if call.values else BOTTOM):
-        if isinstance(atom, Seq) and not atom.open:
+        if atom == NULL:
+            run.global_arguments.append(())
+        elif isinstance(atom, Seq) and not atom.open:
             run.global_arguments.append(tuple(_word(run, item) for item in atom.items))
         elif not _is_of_program(atom):
             why = "the arguments that the program gives to rclcpp::init are not known"

@@ -5,21 +5,11 @@ Source: rclcpp/node.hpp, parameter_client.hpp, parameter_event_handler.hpp; nav2
 
 from __future__ import annotations
 
-from enclave_addons.inference.cpp.findings import AllocatedNode
-from enclave_addons.inference.cpp.libraries import (
-    IN_PLACE_OF_SOURCE,
-    Call,
-    library_class,
-    library_function,
-    library_method,
-    node_method,
-)
-from enclave_addons.inference.cpp.models.interfaces import CLI, SUB, node_of, owner_in
-from enclave_addons.inference.cpp.running.assignments import assign
-from enclave_addons.inference.cpp.running.contents import handed_over, nodes_in
-from enclave_addons.inference.cpp.running.launch_values import settled_text, text_of
-from enclave_addons.inference.cpp.running.machine import Machine, registered
-from enclave_addons.inference.cpp.running.values import (
+from enclave_addons.inference.cpp.engine.calls import handed_over
+from enclave_addons.inference.cpp.engine.expressions import assign
+from enclave_addons.inference.cpp.engine.launch_values import settled_text, text_of
+from enclave_addons.inference.cpp.engine.machine import Machine, registered
+from enclave_addons.inference.cpp.engine.values import (
     BOTTOM,
     Atom,
     Map,
@@ -33,8 +23,19 @@ from enclave_addons.inference.cpp.running.values import (
     concatenated,
     join,
     literal,
+    nodes_in,
     unknown,
 )
+from enclave_addons.inference.cpp.findings import AllocatedNode
+from enclave_addons.inference.cpp.libraries import (
+    IN_PLACE_OF_SOURCE,
+    Call,
+    library_class,
+    library_function,
+    library_method,
+    node_method,
+)
+from enclave_addons.inference.cpp.models.interfaces import CLI, SUB, node_of, owner_in
 from enclave_addons.inference.cpp.syntax import field_of, unwrapped
 from nodl.builtin_interfaces import PARAMETER_SERVICES
 
@@ -74,7 +75,7 @@ def _declare(run: Machine, call: Call) -> Value:
         for name in parameter_names(run, call.value(0)):
             if name is not None:
                 call.record.declare(name, BOTTOM)
-    run.later(call.values[2:], call.frame)
+    run.later(call.values[2:])
     return read(run, call.record, call.value(0), default)
 
 
@@ -154,6 +155,18 @@ def _parameter_value(run: Machine, call: Call) -> Value | None:
     return call.values[0] if call.values else None
 
 
+@library_function(
+    "autoware_utils_rclcpp::get_or_declare_parameter", "autoware_utils::get_or_declare_parameter",
+    "autoware::universe_utils::getOrDeclareParameter",
+)  # fmt: skip
+def _get_or_declare(run: Machine, call: Call) -> Value:
+    """Model autoware_utils_rclcpp/parameter.hpp: (node, name)."""
+    owner = owner_in(call.values)
+    if owner is None or owner.node is None:
+        return unknown("a parameter of a node that is not known")
+    return read(run, owner.node, call.value(1), call.value(2))
+
+
 @library_function("nav2_util::declare_parameter_if_not_declared", "nav2::declare_parameter_if_not_declared")
 def _declare_if_not(run: Machine, call: Call) -> Value:
     for owner in nodes_in(call.value(0)):
@@ -230,8 +243,6 @@ def _on_event(run: Machine, call: Call) -> Value:
 
 
 def _client_method(run: Machine, call: Call) -> Value:
-    if call.this.type.last.startswith("Sync"):  # it spins its node until the answer is there
-        run.store.others_run()
     handed_over(run, "a parameter client", call.values, call.node, call.frame)
     return unknown("what another node's parameters are")
 

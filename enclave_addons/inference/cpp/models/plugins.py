@@ -6,12 +6,12 @@ what its host hands to it is followed. Source: pluginlib/class_loader.hpp, class
 
 from __future__ import annotations
 
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.objects import construct
+from enclave_addons.inference.cpp.engine.values import Param, Value, join, unknown
 from enclave_addons.inference.cpp.libraries import Call, library_class, library_method
 from enclave_addons.inference.cpp.models.parameters import parameter_names
 from enclave_addons.inference.cpp.reading.type_names import Type
-from enclave_addons.inference.cpp.running.constructors import construct
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import Param, Value, join, unknown
 
 
 @library_class("pluginlib::ClassLoader")
@@ -33,7 +33,7 @@ def _instance(run: Machine, call: Call) -> Value:
         else:
             why = f"which {base} plugin is loaded is not known: its name is made at run time"
             run.gap(call.node, call.frame, why)
-    return join(*found) if found else unknown("a plugin")
+    return join(*found) if found else unknown("the plugin")
 
 
 def _made(run: Machine, name: str, base: Type, call: Call) -> Value:

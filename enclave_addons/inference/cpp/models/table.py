@@ -13,6 +13,8 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+from enclave_addons.inference.cpp.engine.machine import Machine
+from enclave_addons.inference.cpp.engine.values import BOTTOM, Text, Value, concatenated, literal, unknown
 from enclave_addons.inference.cpp.libraries import (
     LIBRARY_CLASSES,
     LIBRARY_FUNCTIONS,
@@ -38,8 +40,6 @@ from enclave_addons.inference.cpp.models.interfaces import (
 )
 from enclave_addons.inference.cpp.models.nodes import become_node
 from enclave_addons.inference.cpp.reading.type_names import Type
-from enclave_addons.inference.cpp.running.machine import Machine
-from enclave_addons.inference.cpp.running.values import BOTTOM, Text, Value, concatenated, literal, unknown
 from nodl.name_template import ParameterPart
 from nodl.node_interface import EndpointKind
 
@@ -132,7 +132,7 @@ ROWS.update({re.sub(r"^autoware_utils_\w+::", "autoware_utils::", name): row for
 def _make(row: Sequence[Makes], run: Machine, call: Call) -> None:
     """Make the interfaces of a row, on the node among the arguments."""
     owner = owner_in(call.values)
-    run.later(call.values, call.frame)
+    run.later(call.values)
     if owner is None:
         if row:
             why = f"the node that {call.this.type.name} makes interfaces on is not known"
@@ -196,7 +196,7 @@ def listener(run: Machine, call: Call) -> None:
         run.gap(call.node, call.frame, "the node of this tf2_ros::TransformListener is not known")
         return
     if owner is None:
-        owner = run.obj(("own node", call.this), Type("rclcpp::Node"), heap=True)
+        owner = run.object(("own node", call.this), Type("rclcpp::Node"), heap=True)
         name = concatenated(literal("transform_listener_impl_"), unknown("an address"))
         record = become_node(run, replace(call, values=[name], receiver=owner))
         record.description, record.parameter_services = "tf2_ros::TransformListener", False
@@ -245,7 +245,7 @@ def _service(run: Machine, call: Call) -> None:
         part = ParameterPart("service_introspection_mode", "disabled", None, (("only if equal", (mode,)),))
         events = concatenated(name, literal("/_service_event"), (Text((part,)),))
         run.endpoint(record, PUB, events, f"{kind}_Event" if kind else "", call)
-    run.later(call.values, call.frame)
+    run.later(call.values)
 
 
 @node_class("nav2_util::LifecycleNode", "nav2::LifecycleNode")

@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from enclave_addons.inference.cpp.reading.preprocess import Preprocessed
 from enclave_addons.inference.cpp.syntax import Node, Tree, children, field_of, line_of, text, walk
-
-if TYPE_CHECKING:
-    from enclave_addons.inference.cpp.ledger import Site
-    from enclave_addons.inference.cpp.reading.writes import VariableWrites
-
 
 _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
@@ -54,7 +48,6 @@ class Function:
     variadic: bool = False
     specialises: tuple[str, ...] | None = None  # arguments as written, its own or those of its class
     overrides: bool = False  # says so
-    written: VariableWrites | None = None  # what it does to variables, when asked
     _words: frozenset[str] | None = None
 
     @property
@@ -168,7 +161,6 @@ class FileIndex:
     enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
-    sites: tuple[Site, ...] | None = None  # where it may make interfaces, when asked
 
 
 def conversion(node: Node) -> Node | None:

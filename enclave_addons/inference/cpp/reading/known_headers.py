@@ -36,7 +36,7 @@ KNOWN_HEADERS = frozenset({
 ROS_LIBRARIES = frozenset({
     "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "tf2_ros", "image_transport", "message_filters",
     "diagnostic_updater", "nav2_util", "interactive_markers", "camera_info_manager", "realtime_tools", "bond",
-    "point_cloud_transport",
+    "point_cloud_transport", "moveit",
 })  # fmt: skip
 
 _INTERFACES = re.compile(r"/(?:msg|srv|action)/")

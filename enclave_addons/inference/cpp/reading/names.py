@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, update_wrapper
 from itertools import chain
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
-from enclave_addons.inference.cpp.reading.declarations import Class, Field, FileIndex, Function, Global, Scope
-from enclave_addons.inference.cpp.reading.known_headers import ROS_LIBRARIES, is_reviewed
+from enclave_addons.inference.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 from enclave_addons.inference.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
-from enclave_addons.inference.cpp.syntax import Node, text
 
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
@@ -64,10 +61,6 @@ _FRESH = r"(?:new\b(?!\s*\()|nullptr\b|NULL\b)"
 _POINTS_AT_NEW = rf"\s*(?:->|\[|[!=]=|=\s*{_FRESH}|[({{]\s*{_FRESH}|\)\s*\{{)"
 """Matches behind a pointer: a member access, a comparison, or an assignment of what ``new`` makes."""
 _OF_ONE_STAR = re.compile(r"^[^*&]*\*[^*&]*$")
-
-
-def _is_fresh(value: Node | None) -> bool:
-    return value is None or re.match(rf"[={{\s]*(?:{_FRESH}|\}})", text(value)) is not None
 
 
 class Alias(NamedTuple):
@@ -167,100 +160,6 @@ class Names:
             for function in index.all_functions:
                 found.setdefault(function.name, []).append(function)
         return found
-
-    @cached_property
-    def pointers_to_plain(self) -> dict[str, set[str]]:
-        """Return the members that are pointers or references to texts, numbers or containers, with their classes."""
-        found: dict[str, set[str]] = {}
-        for cls, field in self._data_members():
-            if field.pointer and _PLAIN.fullmatch(field.type):
-                found.setdefault(field.name, set()).add(cls.name)
-        return found
-
-    @_once
-    def may_show_variables(self, pointer: str) -> bool:
-        """Return whether data members of this name, pointers or references to plain values, may lead to variables.
-
-        Not pointers to fractions, which decide nothing, and those that are only set to what ``new`` makes.
-        """
-        fields = [
-            field
-            for _, field in self._data_members()
-            if field.name == pointer and field.pointer and _PLAIN.fullmatch(field.type)
-        ]
-        if all(field.type in ("double", "float") for field in fields):
-            return False
-        if not all(_OF_ONE_STAR.search(text(field.node)) and _is_fresh(field.default) for field in fields):
-            return True
-        use = re.compile(rf"(return|delete(?:\s*\[\s*\])?)\s+{pointer}\s*;|\b{pointer}\b({_POINTS_AT_NEW})?")
-        return any(
-            not (match[1] or match[2])
-            for function in chain.from_iterable(self.functions_by_name.values())
-            if pointer in function.words
-            for match in use.finditer(text(function.node))
-        )
-
-    @cached_property
-    def static_members(self) -> dict[str, list[Class]]:
-        """Return the names of static data members, with the classes that have them."""
-        found: dict[str, list[Class]] = {}
-        for cls, field in self._data_members():
-            if field.static:
-                found.setdefault(field.name, []).append(cls)
-        return found
-
-    def _data_members(self) -> Iterator[tuple[Class, Field]]:
-        for cls in chain.from_iterable(self.classes.values()):
-            for field in cls.fields.values():
-                yield cls, field
-
-    @cached_property
-    def operators(self) -> dict[str, list[Function]]:
-        """Return the operators that the program defines, by their signs: ``<<``; not those that convert."""
-        named = ((name.removeprefix("operator"), found) for name, found in self.functions_by_name.items()
-                 if name.startswith("operator"))  # fmt: skip
-        return {
-            sign: found for sign, found in named if sign and not sign[0].isalnum() and sign[0] not in " _"
-        }
-
-    @_once
-    def signs(self, function: Function) -> frozenset[str]:
-        """Return the signs of the program's operators that stand in a function."""
-        return self.signs_in(function.node)
-
-    def signs_in(self, code: Node) -> frozenset[str]:
-        """Return the signs of the program's operators that stand in a piece of code."""
-        source = text(code)
-        return frozenset(
-            sign for sign in self.operators if (sign[0] if sign in ("()", "[]") else sign) in source
-        )
-
-    @_once
-    def has_member_pointers(self, function: Function) -> bool:
-        """Return whether a function uses pointers to members: ``object->*pointer``."""
-        source = text(function.node)
-        return "->*" in source or ".*" in source
-
-    @_once
-    def has_static_variables(self, function: Function) -> bool:
-        """Return whether a function has static variables that are not constant."""
-        return _STATIC.search(text(function.body)) is not None
-
-    @_once
-    def may_end_program(self, function: Function) -> bool:
-        """Return whether a function may end the program."""
-        return self.ends_program(text(function.node), function)
-
-    def ends_program(self, code: str, function: Function | None) -> bool:
-        """Return whether code in ``function`` may end the program; what its class calls so does not: ``abort()``."""
-        return any(
-            each[1] or function is None or not self.has_method(function, each[2])
-            for each in _ENDS.finditer(code)
-        )
-
-    def has_method(self, function: Function, name: str) -> bool:
-        """Return whether ``name`` alone means a method of the class that ``function`` is in."""
-        return bool(self.find_methods(self._class_of_method(function), name))
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:
@@ -391,30 +290,6 @@ class Names:
         return order
 
     @_once
-    def classes_held(self, function: Function, held: str, types: frozenset[str]) -> frozenset[str]:
-        """Return the classes whose objects a variable of a function may hold, by how it is declared; none: any class.
-
-        Args:
-            held: Its name, empty for any other expression.
-            types: The types of local variables of that name; a member of the function's class may have it, too.
-        """
-        written = [(each, function.scope, function.file) for each in types]
-        for cls in self.classes.get(function.owner.rpartition("::")[2], ()) if held else ():
-            declaring = (base for base in self.ancestry(cls) if held in base.fields)
-            written += [(base.fields[held].type, base.scope, base.file) for base in declaring]
-        found = [
-            self.find_class(self.resolve(each, scope, file).name, scope, file)
-            for each, scope, file in written
-        ]
-        names = frozenset(cls.name for cls in found if cls is not None)
-        return frozenset() if None in found or "->" in self.operators else names
-
-    @_once
-    def members(self, cls: Class | None) -> frozenset[str]:
-        """Return the names of the data members of a class and its bases, static ones included."""
-        return frozenset().union(*(each.fields for each in self.ancestry(cls)))
-
-    @_once
     def find_methods(self, cls: Class | None, name: str) -> list[Function]:
         for each in self.ancestry(cls):
             found = self.methods.get(each, {}).get(name, [])
@@ -423,18 +298,6 @@ class Names:
             if found:
                 return found
         return []
-
-    @_once
-    def unlike(self, cls: Class) -> frozenset[str]:
-        """Return names of virtual methods with another signature in a derived class, which does not override them."""
-        return frozenset(
-            name
-            for each in self.ancestry(cls)
-            for name, own in self.methods.get(each, {}).items()
-            for base in self.ancestry(each)[1:]
-            for method in self.methods.get(base, {}).get(name, ())
-            if method.virtual and name[0] != "~" and not any(self.overrides(f, method) for f in own)
-        )
 
     def overrides(self, own: Function, base: Function) -> bool | None:
         """Return whether a method of a derived class overrides a virtual one of the same name; ``None``: perhaps."""
@@ -479,43 +342,6 @@ class Names:
     @_once
     def declarations(self, cls: Class | None, name: str) -> list[Function]:
         return [d for each in self.ancestry(cls) for d in each.declared.get(name, ())]
-
-    def foreign_header(self, name: str, file: FileIndex) -> str:
-        """Return the header, of a library that was not reviewed, that a class may come from; empty if there is none.
-
-        A class in a namespace comes from a folder of that name, or else from a package that ``package.xml`` names. A
-        header that is called as the class is the one that a reader looks for, whatever else is not in reach.
-        """
-        found, alike = "", ""
-        for each in sorted(self.visible(file.file)):
-            index = self.files.get(each)
-            for header in index.source.foreign if index is not None else ():
-                folder = header.partition("/")[0]
-                if _plain(header) == _plain(name.replace("::", "/")):
-                    alike = header
-                if "/" in header and not is_reviewed(header):
-                    if name.partition("::")[0] == folder:
-                        return header
-                    is_possible = folder in self.depends or ("::" not in name and not self.depends)
-                    found = found or (header if is_possible else "")
-        if not found and "::" in name and name.partition("::")[0] in self.depends:
-            return f"package {name.partition('::')[0]}"
-        if not found and re.search(r"(?:^|::)\w*Node$", name):
-            found = "no header in reach defines it"
-        return found and (alike or found)
-
-    @_once
-    def unreviewed(self, scope: Scope, file: FileIndex) -> str:
-        """Return a source of a class without a namespace that may make a node; empty if there is none.
-
-        It is a header that is neither in reach nor reviewed, or the namespace of a ROS library, used or reopened.
-        """
-        entered = [*self.used_namespaces(file.file), *scope[:1]]
-        ours = next((each for each in entered if each.partition("::")[0] in ROS_LIBRARIES), "")
-        if ours:
-            return f"namespace {ours}"
-        indexes = (self.files[each] for each in sorted(self.visible(file.file)) if each in self.files)
-        return next((h for each in indexes for h in each.source.foreign if not is_reviewed(h)), "")
 
     # --- types ------------------------------------------------------------------------------------------
 
@@ -634,18 +460,3 @@ def _complete(function: Function, declared: Iterable[Function]) -> None:
 _BUILT_IN = re.compile(
     r"(?:(?:unsigned|signed|long|short|int|char|bool|float|double) ?)+|(?:std::)?(?:string|size_t)|u?int\d+_t"
 )
-
-
-def hidden(names: Names, cls: Class) -> frozenset[str]:
-    """Names of members, and of methods that are not virtual, which the class or a base of it hides from another."""
-    if cls not in names.hidden:
-        listed = [name for each in names.ancestry(cls) for name in {*each.fields, *_fixed(names, each)}]
-        names.hidden[cls] = frozenset(name for name, times in Counter(listed).items() if times > 1)
-    return names.hidden[cls]
-
-
-def _fixed(names: Names, cls: Class) -> set[str]:
-    """Return methods that the class seen at compile time decides, without constructors and destructors."""
-    found = [*names.methods.get(cls, {}).items(), *cls.declared.items()]
-    virtual = {name for name, listed in found if any(each.virtual for each in listed)}
-    return {name for name, _ in found if name != cls.name and not name.startswith("~")} - virtual

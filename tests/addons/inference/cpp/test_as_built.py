@@ -53,18 +53,6 @@ CONDITIONAL = in_class(f"""
 RADAR = "publisher radar is made only where the build says defined(WITH_RADAR)"
 
 
-def test_what_the_build_does_not_define_is_not_made(tmp_path: Path) -> None:
-    cmake = """option(RADAR "" OFF)
-add_compile_definitions(WITH_CAMERA)
-add_executable(node src/main.cpp)
-if(RADAR)
-  target_compile_definitions(node PRIVATE WITH_RADAR)
-endif()"""
-    built = infer(tmp_path / "built", CONDITIONAL, cmake, built=True)
-    assert (names(built), gaps(built)) == (["always", "camera"], [])
-    assert RADAR in gaps(infer(tmp_path / "unbuilt", CONDITIONAL, cmake, built=False))
-
-
 def test_a_name_that_the_build_gives(tmp_path: Path) -> None:
     cmake = 'add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE TOPIC="front/scan")'
     built = infer(tmp_path, in_class(f"{PUB}(TOPIC, 1);"), cmake, built=True)
@@ -97,16 +85,6 @@ target_link_libraries(node attached)
 """
 
 
-def test_what_only_the_library_defines_is_not_taken_for_undefined(tmp_path: Path) -> None:
-    main = in_class("attach(this);", before="void attach(rclcpp::Node * node);")
-    library = {"src/attach.cpp": LIBRARY}
-    with_it = LINKED + "target_compile_definitions(attached PRIVATE DEBUG_TOPICS)"
-    (why,) = gaps(infer(tmp_path / "with", main, with_it, built=True, **library))
-    assert why == "publisher debug is made only where the build says defined(DEBUG_TOPICS)"
-    without = infer(tmp_path / "without", main, LINKED, built=True, **library)
-    assert (names(without), gaps(without)) == ([], [])
-
-
 def test_what_one_file_alone_is_compiled_with_leaves_the_rest_open(tmp_path: Path) -> None:
     cmake = (
         "add_executable(node src/main.cpp)\n"
@@ -125,10 +103,3 @@ EITHER = in_class(f"""
   {PUB}("real", 1);
 #endif
 """)
-
-
-def test_without_a_build_nothing_is_known_of_what_is_defined(tmp_path: Path) -> None:
-    cmake = "add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE SIM TOPIC)"
-    system = infer(tmp_path / "either", EITHER, cmake, built=False)
-    assert any("else of defined(SIM)" in why for why in gaps(system))
-    assert names(infer(tmp_path / "name", in_class(f"{PUB}(TOPIC, 1);"), cmake, built=False)) == ["?"]

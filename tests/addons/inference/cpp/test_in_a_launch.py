@@ -259,22 +259,6 @@ PARAMETERS = (
 )
 
 
-def test_a_parameter_decides_what_a_launch_makes(tmp_path: Path) -> None:
-    """But for one that the program sets itself, and those of a node beside the first."""
-    package(tmp_path / "src/demo", {"src/demo.cpp": DECIDES}, "add_executable(filter_node src/demo.cpp)\n")
-    install(tmp_path)
-    every = {"/camera", "/leg0", "/leg1", "/leg2", "/fast", "/slow", "/spare", "/beside"}
-    for parameters, decided in ((PARAMETERS, {"/leg2", "/fast"}), ("", {"/camera", "/slow"})):
-        found = plan(tmp_path, f'<launch><node pkg="demo" exec="filter_node">{parameters}</node></launch>')
-        assert not found.problems
-        assert {name for name in every if may(found, name)} == decided | {
-            "/leg0",
-            "/leg1",
-            "/spare",
-            "/beside",
-        }
-
-
 IN_A_NAMESPACE = HEAD + (
     'class Arm : public rclcpp::Node { public: Arm() : Node("n", "arm") {'
     'create_publisher<std_msgs::msg::Bool>(std::string(get_namespace()) + "/own", 1);'

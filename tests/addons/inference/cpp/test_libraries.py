@@ -189,16 +189,6 @@ def test_of_autoware_utils(body: str, expected: set[tuple[str, str]], tmp_path: 
     assert (endpoints(system), gaps(system)) == (expected, [])
 
 
-def test_a_class_that_nobody_read_is_told_once_and_a_node_that_it_gets_each_time(tmp_path: Path) -> None:
-    made = "acme::Scope a(1);\nacme::Scope b(2);\nacme::Scope c(this);\nacme::Scope d(this);"
-    source = in_class(made, before="#include <acme/scope.hpp>\n")
-    told = gaps(
-        infer_paths([package(tmp_path / "demo", {"src/main.cpp": source}, depends=("rclcpp", "acme"))])
-    )
-    assert sum("it may be a node or make one" in each for each in told) == 1, told
-    assert sum("the node is handed to the constructor" in each for each in told) == 2
-
-
 @pytest.mark.parametrize("library", ["gz", "gazebo"])
 def test_nodes_of_gazebo_make_no_interfaces_of_ros_and_their_callbacks_run(
     library: str, tmp_path: Path
@@ -210,10 +200,3 @@ def test_nodes_of_gazebo_make_no_interfaces_of_ros_and_their_callbacks_run(
     body = 'gazebo->Init(); gazebo->Subscribe("~/contacts", &Demo::on, this);'
     system = infer(tmp_path, in_class(body, members))
     assert (names(system), gaps(system)) == (["made_by_callback"], [])
-
-
-def test_what_else_bears_gazebos_name_may_make_interfaces(tmp_path: Path) -> None:
-    system = infer(tmp_path, in_class("auto helper = std::make_shared<gazebo::Helper>(this);"))
-    assert "the node is handed to the constructor of gazebo::Helper, which may make interfaces on it" in gaps(
-        system
-    )

@@ -159,13 +159,6 @@ def test_a_hardware_component_brings_the_node_that_it_makes(hardware: Planned) -
     assert "/effort" in names(plan) and "/command" not in names(plan)
 
 
-def test_a_plugin_is_found_where_macros_of_its_own_list_the_sources(hardware: Planned) -> None:
-    cmake = CMAKE.replace("src/own.cpp", "${LISTED_BY_A_MACRO}")
-    assert not hardware("", cmake=cmake).problems
-    (problem,) = hardware(OF_A_FIELD_BUS, cmake=cmake).problems
-    assert "FieldBus is not in reach" in str(problem)
-
-
 def test_a_hardware_component_makes_interfaces_on_the_node_that_it_is_given(hardware: Planned) -> None:
     plan = hardware(
         'auto topic = get_node()->declare_parameter<std::string>("topic", "command");'
@@ -174,12 +167,6 @@ def test_a_hardware_component_makes_interfaces_on_the_node_that_it_is_given(hard
     assert not plan.problems
     assert "/arm/load" in names(plan)
     assert names(plan).isdisjoint({"/arm/command", "/controller_manager/load", "/arm/effort"})
-
-
-def test_a_hardware_component_that_cannot_be_followed_is_a_gap_with_the_reason(hardware: Planned) -> None:
-    (problem,) = hardware(OF_A_FIELD_BUS).problems
-    assert "FieldBus is not in reach" in str(problem)
-    assert "hardware component 'arm' of class 'own/It'" in str(problem)
 
 
 def test_a_hardware_component_without_sources_is_a_gap(hardware: Planned) -> None:

@@ -151,11 +151,6 @@ def test_an_image_publisher_has_its_transports(tmp_path: Path) -> None:
     } <= found
 
 
-def test_a_class_of_a_known_library_that_nobody_reviewed_is_a_gap(tmp_path: Path) -> None:
-    source = in_class("x_ = std::make_shared<tf2_ros::Novelty>(1);", "std::shared_ptr<tf2_ros::Novelty> x_;")
-    assert any("tf2_ros::Novelty is not in the table" in each for each in gaps(infer(tmp_path, source)))
-
-
 NAMES = {
     "a constant in a header's namespace": ("create_publisher<M>(names::kTopic, 1);", "a"),
     "a macro": ("create_publisher<M>(TOPIC, 1);", "a"),
@@ -269,9 +264,3 @@ def test_the_release_that_is_installed_decides_what_is_compiled(
     folder = package(tmp_path / "demo", {"src/main.cpp": HEAD + RELEASE})
     (found,) = infer_sources([str(folder / "src/main.cpp")], [str(tmp_path / "ros")]).nodes
     assert [str(endpoint.name) for endpoint in found.endpoints] == [name]
-
-
-def test_where_the_release_is_not_known_neither_is_certain(tmp_path: Path) -> None:
-    found = infer(tmp_path, HEAD + RELEASE)
-    assert endpoints(found) == set()
-    assert len([why for why in gaps(found) if "only where the build says" in why]) == 2

@@ -1,0 +1,1 @@
+"""The engine: runs a program in the order of its text over values that may be open."""

@@ -1,1 +1,0 @@
-"""A program run in the abstract: values, variables, statements, expressions, calls, objects."""
