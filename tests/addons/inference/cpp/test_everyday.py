@@ -400,11 +400,6 @@ def test_a_catch_finds_what_was_written_before_the_exception(
     assert names(infer(tmp_path, in_class(program, before=before))) == made
 
 
-def test_a_method_called_abort_does_not_end_the_program(call: str, made: list[str], tmp_path: Path) -> None:
-    source = in_class(f'{call} {PUB}("a", 1);', "void abort() {}")
-    assert names(infer(tmp_path, source)) == made
-
-
 GUARDED = """#ifdef DEMO_DEBUG
 #define GUARD(x) if (!(x)) abort()
 #else
