@@ -15,15 +15,23 @@ from hypothesis import HealthCheck, settings
 settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("unhurried")
 
-FAST = ("description", "evaluation", "frontend", "launch_ros", "nodl", "policy")
+FAST = (
+    "addons/inference",
+    "addons/library",
+    "description",
+    "evaluation",
+    "frontend",
+    "launch_ros",
+    "nodl",
+    "policy",
+)
 """Folders whose tests start no node, make no key and need no network."""
 THOROUGH = (
     "evaluation/test_error_text.py",
     "evaluation/test_explore.py",
     "launch_ros/test_enclave_scopes.py",
-    "enclave_addons/inference/cpp/test_in_a_launch.py",
-    "enclave_addons/inference/test_deceptions.py",
-    "enclave_addons/inference/test_in_a_launch.py",
+    "addons/inference/cpp/test_in_a_launch.py",
+    "addons/inference/test_in_a_launch.py",
     "policy/test_components.py",
 )
 """Tables in these folders that take more than three seconds each: together half of the time."""
@@ -52,7 +60,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         file = item.path.relative_to(tests)
         if file.as_posix() in THOROUGH:
             continue
-        if file.parts[0] in FAST or item.path.parent == tests:
+        if file.as_posix().startswith(FAST) or item.path.parent == tests:
             item.add_marker(pytest.mark.fast)
 
 

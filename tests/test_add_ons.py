@@ -33,7 +33,7 @@ TALKER = "talker_listener.launch.xml"
 # add-on -> a command line that needs it
 NEEDS: dict[str, tuple[str, ...]] = {
     "inference": ("nodl.verb", "infer", "."),
-    "recording": ("enclave_launch", "--learn", "learnt", *DRY_RUN[2:], "talker_listener.launch.xml"),
+    "recording": ("nodl.verb", "check-record", "learnt"),
     "observation": ("nodl.verb", "observe", "--for", "1s"),
     "library": ("nodl.verb", "library", "list"),
     "review": ("secure-plan", "check", "demo_nodes", "talker_listener.launch.xml"),
@@ -115,6 +115,17 @@ def test_a_verb_of_an_add_on_that_is_not_installed_says_so(add_on: str, core: Pa
         assert ran.returncode == 1
         assert "is not part of this installation" in ran.stderr
         assert ran.stderr.count("\n") == 1, ran.stderr
+
+
+@pytest.mark.parametrize(("add_on", "option"), [("recording", "--audit"), ("observation", "--watch")])
+def test_an_option_of_an_add_on_that_is_not_installed_starts_nothing(
+    add_on: str, option: str, whole: Path, tmp_path: Path
+) -> None:
+    words = ("enclave_launch", option, "--provision-only", *DRY_RUN[2:], TALKER)
+    assert "--provision-only writes the keystore" in python(whole, *words).stderr
+    ran = python(copy_without(ADD_ONS[add_on], tmp_path), *words)
+    assert ran.returncode == 2 and f"unrecognized arguments: {option}" in ran.stderr, ran.stderr
+
 
 
 def test_a_process_on_zenoh_is_refused_without_that_add_on(

@@ -97,6 +97,8 @@ def test_colcon_reads_the_same_with_pyproject_toml_and_without(tmp_path: Path) -
         "setup.py",
         "package.xml",
         "resource",
+        "enclave_addons",
+        "enclave_common",
         "enclave_launch",
         "nodl",
         "keystore",
