@@ -127,7 +127,6 @@ def test_an_option_of_an_add_on_that_is_not_installed_starts_nothing(
     assert ran.returncode == 2 and f"unrecognized arguments: {option}" in ran.stderr, ran.stderr
 
 
-
 def test_a_process_on_zenoh_is_refused_without_that_add_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -287,11 +287,11 @@ def _refuse_forgotten(found: _Bundle, present: KeystoreView) -> None:
     A CRL number does not tell, for it comes from the clock. What a CA revoked is on all its later lists.
     """
     pem = safe_files.read_if_there(present.root, layout.CRL)
-    known = listed_in(pem, present, layout.CRL) if pem is not None else None
+    known = listed_in(pem, present.ca_bundle(Role.IDENTITY), layout.CRL) if pem is not None else None
     if known is None or fingerprint(known.issuer.der) not in found.manifest.authorities[Role.IDENTITY][:1]:
         return
     given = found.files.get(layout.CRL)
-    coming = listed_in(given, present, layout.CRL) if given is not None else None
+    coming = listed_in(given, present.ca_bundle(Role.IDENTITY), layout.CRL) if given is not None else None
     missing = sorted(set(known.revoked) - set(coming.revoked if coming is not None else ()))
     if missing:
         listed = some_of([f"{serial:X}" for serial in missing], 8)

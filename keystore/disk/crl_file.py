@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from functools import lru_cache
 from typing import NamedTuple
@@ -74,24 +76,31 @@ class ListedCrl(NamedTuple):
     revoked: dict[int, datetime]
 
 
-def crls_in(view: KeystoreView) -> list[ListedCrl]:
-    """Return every CRL in the tree that an identity CA trusted here signed, whoever put it there, in whatever form:
-    in ``public/`` and in the enclaves, where an rmw reads it."""
-    places = [layout.CRL, *(layout.enclave_file(name, layout.ENCLAVE_CRL) for name in view.enclaves())]
+def crls_in(view: KeystoreView, issuers: Sequence[CertificateFacts] | None = None) -> list[ListedCrl]:
+    """Return every CRL in the tree, whoever put it there and in whatever form.
+
+    Args:
+        view: The keystore. CRLs lie in ``public/`` and in the enclaves, where an rmw reads them.
+        issuers: The identity CAs whose CRLs count. None stands for those of the trust file.
+    """
+    enclaves = view.enclaves() if os.path.isdir(view.root / layout.ENCLAVES) else ()
     found = []
-    for place in places:
-        if safe_files.link_target(view.root, place) is None:
-            pem = safe_files.read_if_there(view.root, place)
-            found += [listed] if pem is not None and (listed := listed_in(pem, view, place)) else []
+    for place in (layout.CRL, *(layout.enclave_file(name, layout.ENCLAVE_CRL) for name in enclaves)):
+        if safe_files.link_target(view.root, place) is not None:
+            continue
+        pem = safe_files.read_if_there(view.root, place)
+        if pem is None:
+            continue
+        listed = listed_in(pem, view.ca_bundle(Role.IDENTITY) if issuers is None else issuers, place)
+        if listed is not None:
+            found.append(listed)
     return found
 
 
-def listed_in(pem: bytes, view: KeystoreView, place: str) -> ListedCrl | None:
-    """Return the CRL in a file if one of the identity CAs trusted here signed it."""
+def listed_in(pem: bytes, issuers: Iterable[CertificateFacts], place: str) -> ListedCrl | None:
+    """Return the CRL in a file if one of ``issuers`` signed it."""
     crl = _parsed(pem)
-    issuer = next(
-        (ca for ca in view.ca_bundle(Role.IDENTITY) if crl is not None and _is_signed(pem, ca)), None
-    )
+    issuer = next((ca for ca in issuers if crl is not None and _is_signed(pem, ca)), None)
     if crl is None or issuer is None:
         return None
     revoked = {entry.serial_number: time_of(entry, "revocation_date") for entry in crl}

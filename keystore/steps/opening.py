@@ -17,7 +17,7 @@ from keystore.disk.signed_documents import foreign_document, foreign_governance,
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, WrongClockError, printable
-from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates
+from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates, read_der
 from keystore.formats.governance import governance_document, parse_governance
 from keystore.formats.permissions_document import parse_permissions, read_foreign_permissions
 from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
@@ -89,7 +89,9 @@ def _adopt_crls(opened: Store) -> None:
     backup, or where somebody revoked with openssl. Nobody who was revoked comes back.
     """
     view = KeystoreView(opened.root)
-    newer = with_crls(opened, crls_in(view))
+    # The register's CAs count: a trust file that is damaged is repaired only later.
+    issuers = [read_der(ca) for ca in opened.register.trusted_authorities(Role.IDENTITY)]
+    newer = with_crls(opened, crls_in(view, issuers))
     if newer != opened.register:
         with opened.batch() as batch:
             batch.record(newer)

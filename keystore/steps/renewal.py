@@ -116,7 +116,9 @@ def renew(
 
 def _adopt(opened: Store, place: Path) -> None:
     """Take over the list of a host: after a restore from a backup it may know more than this keystore."""
-    listed = listed_in(read_given(place), KeystoreView(opened.root), printable(place))
+    listed = listed_in(
+        read_given(place), KeystoreView(opened.root).ca_bundle(Role.IDENTITY), printable(place)
+    )
     if listed is None:
         raise InvalidInputError(
             f"{printable(place)} is not a CRL that an identity CA of this keystore signed"

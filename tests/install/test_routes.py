@@ -138,7 +138,7 @@ def test_the_core_without_its_add_ons(clone: Path, tmp_path: Path) -> None:
     demo = ("--prefix", str(DEMO), "demo_nodes", "talker_listener.launch.xml")
     assert "publish: /chatter" in do(str(commands / "secure-launch"), "--dry-run", *demo, cwd=tmp_path)
     secured = ("--secure", "--keystore", "ks", "--provision-only", *demo)
-    assert "keystore ks created" in do(str(commands / "secure-launch"), *secured, cwd=tmp_path)
+    assert "/ks created" in do(str(commands / "secure-launch"), *secured, cwd=tmp_path)
     assert "0 findings: good" in do(str(commands / "secure-keystore"), "verify", "ks", cwd=tmp_path)
     absent = do(str(commands / "secure-nodl"), "infer", ".", cwd=tmp_path, status=1)
     assert "enclave_addons is not part of this installation" in absent
