@@ -189,7 +189,7 @@ class Feature(metaclass=_Table):
     )  # fmt: skip
     WHOLE_ACTIONS = Since(
         "a remap rule for an action's name moves the whole action", "rcl",
-        jazzy=(9, 2, 8), source="ros2/rcl#1170, jazzy: #1220",
+        jazzy=(9, 2, 9), source="ros2/rcl#1170, jazzy: #1220; measured: rcl 9.2.8 of jazzy does not",
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 COMMANDS = {
-    "lxml": ["keystore.verb", "verify", "{keystore}"],
+    "lxml": ["keystore.verb", "apply-policy", "{keystore}", "{yaml}"],
     "cryptography": ["keystore.verb", "create", "{new}"],
     "yaml": ["enclave_launch", "--dry-run", "{yaml}"],
     "pydantic": ["keystore.verb", "governance", "{keystore}", "{yaml}"],

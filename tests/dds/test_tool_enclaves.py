@@ -176,7 +176,10 @@ def test_an_observers_enclave_shows_the_whole_graph_of_a_secured_system_and_a_fo
 ) -> None:
     from tests.dds.conftest import HERE
 
-    nodes = Implementation("Cyclone DDS", (sys.executable, str(HERE.parent / "graph" / "cyclone_nodes.py")))
+    nodes = Implementation(
+        "Cyclone DDS",
+        (sys.executable, str(HERE.parent / "addons" / "observation" / "graph" / "cyclone_nodes.py")),
+    )
     directory = root / "enclaves" / "talker"
     program = start(nodes, str(directory), enclave="/talker")
     program.tell("node /talker", *topic("/chatter", writes=True), "list")

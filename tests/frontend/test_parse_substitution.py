@@ -89,7 +89,10 @@ def test_the_innermost_call_complains_first() -> None:
 
 def test_names_that_a_release_has_not() -> None:
     parse_substitution("$(equals a b)")
-    with active_host(PlanHost(distro="humble")), pytest.raises(VisitError, match="substitution: equals"):
+    with (
+        active_host(PlanHost(distro="humble@2024-12")),
+        pytest.raises(VisitError, match="substitution: equals"),
+    ):
         parse_substitution("$(equals a b)")
     parse_substitution("$(equals a b)")
 

@@ -101,7 +101,7 @@ def test_only_text_is_coerced() -> None:
 
 @pytest.mark.parametrize("digit", ["0", "1"])
 def test_humble_has_no_digits_for_booleans(digit: str) -> None:
-    with active_host(PlanHost(distro="humble")), pytest.raises(ValueError, match=f"value '{digit}'"):
+    with active_host(PlanHost(distro="humble@2024-12")), pytest.raises(ValueError, match=f"value '{digit}'"):
         tu.coerce_to_type(digit, bool)
 
 

@@ -146,8 +146,8 @@ def test_actions_of_newer_releases_are_remapped_as_a_whole(node: NodeMaker, dist
     assert found.warnings == ()
 
 
-@pytest.mark.parametrize(("rcl", "name"), [((9, 2, 7), "/fib"), ((9, 2, 8), "/whole")])
-def test_jazzys_rcl_remaps_whole_actions_since_9_2_8(
+@pytest.mark.parametrize(("rcl", "name"), [((9, 2, 8), "/fib"), ((9, 2, 9), "/whole")])
+def test_jazzys_rcl_remaps_whole_actions_since_9_2_9(
     node: NodeMaker, rcl: tuple[int, ...], name: str
 ) -> None:
     found = derive_policy([node("action fib", remap=("fib:=whole",))], distro="jazzy", rcl=rcl)

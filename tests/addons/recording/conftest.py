@@ -89,3 +89,15 @@ def rclpy_python(release: str) -> Path:
             pytest.fail(message)
         pytest.skip(message)
     return python
+
+
+def prefix_of_rclpy(release: str, folder: Path) -> Path:
+    """An install prefix whose index has rcl in the version that this rclpy runs on, as an installed ROS has it."""
+    (found,) = (ROOT / ".ros" / release).glob("lib/python*/site-packages/ros_rcl-*.dist-info")
+    version = found.name.removeprefix("ros_rcl-").removesuffix(".dist-info")
+    for place in ("share/ament_index/resource_index/packages/rcl", "share/rcl/package.xml"):
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        (folder / place).write_text(
+            f'<package format="3"><name>rcl</name><version>{version}</version><description/></package>\n'
+        )
+    return folder

@@ -21,7 +21,7 @@ from enclave_launch.policy.derivation import LIST_NAMES
 from nodl.document import read_document
 from nodl.name_template import NameTemplate, ParameterPart
 from nodl.verb import main as secure_nodl
-from tests.addons.recording.conftest import ROOT, rclpy_python
+from tests.addons.recording.conftest import ROOT, prefix_of_rclpy, rclpy_python
 from tests.programs import install_package, python_program
 
 WORKSPACE = ROOT / "fixtures" / "rclpy_ws"
@@ -42,6 +42,7 @@ def environment(release: str, folder: Path, **more: str) -> dict[str, str]:
     return {
         **os.environ,
         "RCLPY_PYTHON": str(rclpy_python(release)),
+        "AMENT_PREFIX_PATH": str(prefix_of_rclpy(release, folder / "rcl")),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(folder / "log"),
         "ROS_DISTRO": release,
@@ -171,7 +172,8 @@ def test_a_manifest_that_lacks_a_name_fails_against_the_record(
 
 
 def resolved(launch_file: str, release: str, folder: Path) -> LaunchPlan:
-    options = ResolveOptions(prefixes=(WORKSPACE,), manifests=(folder,), distro=release, infer=False)
+    prefixes = (WORKSPACE, prefix_of_rclpy(release, folder.parent / "rcl"))
+    options = ResolveOptions(prefixes=prefixes, manifests=(folder,), distro=release, infer=False)
     plan = resolve(LAUNCH_FILES / launch_file, options=options)
     assert plan.problems == ()
     return plan

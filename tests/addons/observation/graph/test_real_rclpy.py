@@ -20,7 +20,7 @@ from tests.addons.recording.conftest import rclpy_python
 pytestmark = pytest.mark.dds
 
 ROOT = Path(__file__).parents[4]
-NODES = ROOT / "tests" / "ros_graph" / "nodes"
+NODES = Path(__file__).parents[1] / "ros_graph" / "nodes"
 ASK_RCLPY = """
 import json, sys
 from enclave_addons.observation.graph.json_form import graph_document

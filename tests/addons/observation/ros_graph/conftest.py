@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tests.addons.recording.conftest import rclpy_python
+from tests.addons.recording.conftest import prefix_of_rclpy, rclpy_python
 from tests.dds.conftest import domain_id as domain_id
 
 HERE = Path(__file__).parent
@@ -51,6 +51,7 @@ def environment(tmp_path: Path, domain_id: int) -> dict[str, str]:
         "PATH": f"{python.parent}:{os.environ['PATH']}",
         "PYTHONPATH": str(ROOT),
         "ROS_DISTRO": "jazzy",
+        "AMENT_PREFIX_PATH": str(prefix_of_rclpy("jazzy", tmp_path / "rcl")),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_DOMAIN_ID": str(domain_id),
         "ROS_LOG_DIR": str(tmp_path / "log"),
