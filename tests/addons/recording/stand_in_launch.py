@@ -55,7 +55,15 @@ class Workspace(NamedTuple):
     def run(
         self, *arguments: str, variables: Mapping[str, str] | None = None, timeout: float = 90
     ) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "enclave_launch", "--prefix", str(self.folder), "--distro", "jazzy"]
+        command = [
+            sys.executable,
+            "-m",
+            "enclave_launch",
+            "--prefix",
+            str(self.folder),
+            "--distro",
+            "jazzy@2024-12",
+        ]
         return subprocess.run(
             [*command, *arguments, PACKAGE, "all.launch.xml"],
             cwd=ROOT,

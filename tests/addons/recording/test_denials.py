@@ -48,7 +48,7 @@ def secured(workspace: Workspace, *arguments: str, **variables: str) -> str:
     keystore = str(workspace.folder / "ks")
     ran = workspace.run(
         *("--secure", "--keystore", keystore, "--enclave-scope", "node", *arguments),
-        variables={**CATCHES, "ROS_DISTRO": "humble", **variables},  # whose rcl the stand-in is
+        variables={**CATCHES, **variables},
     )
     return ran.stdout + ran.stderr
 
@@ -87,7 +87,9 @@ def expected(number: int, times: int = 1) -> set[tuple[str, str, str]]:
     found = set()
     for time in range(times):
         for kind, words in WORDS.items():
-            is_action = kind.startswith("action")  # humble does not remap actions
+            is_action = kind.startswith(
+                "action"
+            )  # the stand-in is rcl of that day, which does not remap actions
             remapped = moved and not private and not is_action and time == 0
             name = f"moved_{number}" if remapped else f"secret_{number}{_ending(time)}"
             found.add((node, words, f"{node if private else namespace}/{name}"))
