@@ -130,8 +130,7 @@ def test_colcon_build(clone: Path, tools: Path, tmp_path: Path, option: list[str
 def test_the_core_without_its_add_ons(clone: Path, tmp_path: Path) -> None:
     """A wheel without ``enclave_addons`` plans, provisions and verifies. The verb of an add-on says what is absent."""
     core = tmp_path / "core"
-    shutil.copytree(clone, core)
-    shutil.rmtree(core / "enclave_addons")
+    shutil.copytree(clone, core, ignore=shutil.ignore_patterns("enclave_addons", "build", "*.egg-info"))
     do("python3", "-m", "venv", str(tmp_path / "venv"), cwd=tmp_path)
     do(str(tmp_path / "venv" / "bin" / "pip"), "install", "-q", ".", cwd=core)
     commands = tmp_path / "venv" / "bin"

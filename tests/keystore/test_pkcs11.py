@@ -48,7 +48,7 @@ def module() -> str | None:
     return next((path for path in MODULES if os.path.exists(path)), None)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # a process logs in once: xdist may run this module's tests in two stretches
 def token(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
     """A token with an EC key for each CA; returns the environment in which it is found."""
     pkcs11 = pytest.importorskip("pkcs11") if os.environ.get("CI") != "true" else __import__("pkcs11")
