@@ -106,6 +106,7 @@ class CommandParser(argparse.ArgumentParser):
     def __init__(self, **settings: Any):
         self.arguments: list[argparse.Action] = []
         self.verbs: dict[str, CommandParser] = {}
+        self._is_verb = False
         texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
         form = {"allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter}
         super().__init__(**{**form, **settings, **texts})
@@ -135,6 +136,7 @@ class CommandParser(argparse.ArgumentParser):
             "epilog": f"{mark}{status}" if mark else None,
         }
         self.verbs[name] = self._add_parser(name, **{**head, **settings})
+        self.verbs[name]._is_verb = True
         return self.verbs[name]
 
     def add_verb_modules(self, package: str, names: Iterable[str]) -> Iterator[tuple[CommandParser, Any]]:
@@ -208,6 +210,14 @@ class CommandParser(argparse.ArgumentParser):
         verb = ["VERB ..."] if self.verbs else []
         return " ".join(("%(prog)s", *required, "[options]", *arguments, *verb))
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Parse as argparse does, but let a verb report what it does not know: the command would suggest options of
+        its other verbs."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown and self._is_verb:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and exit with status 2, as argparse."""
         self.usage = self.usage or self._one_usage()
@@ -216,9 +226,7 @@ class CommandParser(argparse.ArgumentParser):
     def _suggestion(self, message: str) -> str:
         if message.startswith("unrecognized arguments: "):
             options = [word.partition("=")[0] for word in message.split()[2:] if word.startswith("-")]
-            known = [
-                flag for each in parsers(self) for action in each.arguments for flag in action.option_strings
-            ]
+            known = [flag for action in self._actions for flag in action.option_strings]
             return did_you_mean(options[0], known) if options else ""
         if choice := _INVALID_CHOICE.match(message):
             return did_you_mean(choice[1], re.findall(r"[^\s',]+", choice[2]))

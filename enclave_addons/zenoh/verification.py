@@ -67,5 +67,5 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
         if pem is not None and read_certificate(pem, enclave).names_hosts:
             yield Finding(
                 Severity.EXPOSURE, "zenoh-impostor", layout.enclave_file(enclave, layout.CERT),
-                "names hosts, so that its holder could play the router there", repair.run(view.root, "renew", enclave),
+                "names hosts, so that its holder could play the router there", repair.renew(view.root, enclave),
             )  # fmt: skip

@@ -18,7 +18,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from keystore.errors import InvalidInputError, SigningUnavailableError
+from keystore.errors import InvalidInputError, SigningUnavailableError, printable
 from keystore.formats.certificate import CertificateFacts, read_der
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
@@ -173,9 +173,13 @@ def check_can_serve(facts: CertificateFacts, role: Role, now: datetime, place: s
     if constraints is None or not constraints.ca:
         why = "no basicConstraints" if constraints is None else "basicConstraints CA:FALSE"
         raise InvalidInputError(f"{place} is not a CA certificate ({why})")
-    if usage is None:
-        return
-    if role is Role.IDENTITY and not usage.key_cert_sign:
+    if usage is not None and role is Role.IDENTITY and not usage.key_cert_sign:
         raise InvalidInputError(f"{place} may not sign certificates (key usage lacks keyCertSign)")
-    if role is Role.PERMISSIONS and not usage.digital_signature:
+    if usage is not None and role is Role.PERMISSIONS and not usage.digital_signature:
         raise InvalidInputError(f"{place} may not sign documents (key usage lacks digitalSignature)")
+    if facts.issuer != facts.subject:
+        raise InvalidInputError(
+            f"{place} is an intermediate CA, issued by {printable(facts.certificate.issuer.rfc4514_string())}: Cyclone "
+            "DDS refuses what it signs, even with the root in the same file. Give a self-signed CA, such as the root, "
+            "or let secure-keystore create one"
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -201,6 +202,13 @@ def refuse_without_keys(
         return
     more = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
     listed = "".join(f"\n  {line}" for line in lines[:_SHOWN]) + more
+    if view.key_file(Role.PERMISSIONS) is not None:
+        place = shlex.quote(str(view.root))
+        raise SigningUnavailableError(
+            f"the identity CA of {printable(view.root)} is not here, so no certificate can be issued, but these "
+            f"enclaves need one:{listed}\nRequest them on their hosts: secure-keystore request HOST_KEYSTORE ENCLAVE "
+            f"-o requests.pem; take what the CA issued: secure-keystore sign {place} requests.pem --issued issued.pem"
+        )
     raise SigningUnavailableError(
         f"{printable(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
         f"is needed:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "

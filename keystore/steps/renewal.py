@@ -177,9 +177,12 @@ def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: Ren
 
 
 def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
-    """Return whether a certificate could sign documents, or has a subject that another enclave's permissions match."""
+    """Return whether a certificate could sign documents, or has a subject that another enclave's permissions match.
+
+    What another company's CA issued cannot be replaced here, and ``verify`` reports it.
+    """
     facts = view.readable_certificate(name)
-    if facts is None:
+    if facts is None or view.key_file(Role.IDENTITY) is None:
         return False
     scheme = options.provisioning.subjects or view.settings.subjects
     borrows = (

@@ -130,7 +130,7 @@ def _check_settings(view: KeystoreView, register: Register | None) -> Iterator[F
         yield Finding(
             Severity.ERROR, "settings-changed", place,
             "not what this keystore was made with: new certificates would get other subjects, or another lifetime",
-            repair.run(view.root, "renew", note="makes it what it was"),
+            repair.renew(view.root, note="makes it what it was"),
         )  # fmt: skip
         return
     try:

@@ -47,14 +47,14 @@ def check_authorities(
             yield Finding(
                 Severity.NOTE, "roll-over", layout.ca_cert(role),
                 "a CA roll-over is under way (two CAs in the file)",
-                repair.run(view.root, "renew", "--ca", step, note="once this state is deployed"),
+                repair.renew(view.root, "--ca", step, note="once this state is deployed"),
             )  # fmt: skip
     if view.shares_one_ca:
         yield Finding(
             Severity.EXPOSURE, "shared-ca", layout.PUBLIC,
             "one CA for identities and permissions: with Cyclone DDS before 11.0 and Fast DDS before 2.6.5, "
             "2.9.2 and 2.10.1 any enclave can sign permissions and governance for itself (CVE-2023-24010, -24011)",
-            repair.run(view.root, "renew", note="then deploy all enclaves together"),
+            repair.renew(view.root, note="then deploy all enclaves together"),
         )  # fmt: skip
 
 
@@ -65,7 +65,7 @@ def _check_certificate(
     try:
         check_can_serve(facts, role, now, place)
     except KeystoreError as error:
-        fix = repair.run(view.root, "renew", "--ca", "start", note="deploy; then --ca switch and --ca finish")
+        fix = repair.replace_ca(view.root, role)
         yield Finding(Severity.ERROR, "ca-unfit", place, str(error), fix)
     if facts.issuer == facts.subject and not issued_by(facts, facts):
         yield Finding(Severity.ERROR, "ca-signature", place, "its self-signature is wrong", repair.BACKUP)
@@ -75,14 +75,17 @@ def _check_certificate(
         yield Finding(Severity.WARNING, "ca-key-kind", place, text)
     if is_weak(facts.public_key):
         text = f"a {kind} key, which is weak: who breaks it can sign what this CA signs"
-        fix = repair.run(view.root, "renew", "--ca", "start", note="deploy; then --ca switch and --ca finish")
+        fix = repair.replace_ca(view.root, role)
         yield Finding(Severity.EXPOSURE, "weak-key", place, text, fix)
 
 
 def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Finding]:
     name = view.key_file(role)
     if name is None:
-        text = f"not here: nothing can be signed on this machine; trusted is {describe(view.ca(role))}"
+        what = "nothing can be signed on this machine"
+        if view.key_file(Role.PERMISSIONS) is not None:
+            what = "certificates are requested from its owner, and taken with sign --issued"
+        text = f"not here: {what}; trusted is {describe(view.ca(role))}"
         yield Finding(Severity.NOTE, "no-ca-key", layout.ca_key(role), text)
         return
     try:
@@ -131,13 +134,13 @@ def _check_governance(
     if register is not None and register.governance and signed.document != register.governance:
         yield Finding(
             Severity.ERROR, "governance-not-last", place, "signed here, but not the governance that was signed last",
-            repair.run(view.root, "renew", note="signs the last one again"),
+            repair.renew(view.root, note="signs the last one again"),
         )  # fmt: skip
     twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
     if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
         yield Finding(
             Severity.ERROR, "twin-differs", layout.GOVERNANCE_XML,
-            "differs from the signed governance.p7s in force", repair.run(view.root, "renew"),
+            "differs from the signed governance.p7s in force", repair.renew(view.root),
         )  # fmt: skip
 
 
@@ -148,7 +151,7 @@ def _foreign_governance(view: KeystoreView, register: Register | None, error: Ot
     except KeystoreError as worse:
         return Finding(Severity.ERROR, "governance", place, str(worse), fix)
     if needs_register(view) or (register is not None and register.governance):
-        fix = repair.run(view.root, "renew", note="writes it again, or takes the keystore over")
+        fix = repair.renew(view.root, note="writes it again, or takes the keystore over")
     return Finding(Severity.ERROR, "other-form", place, str(error), fix)
 
 
@@ -164,5 +167,5 @@ def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
         yield Finding(
             Severity.ERROR, "crl-expired", layout.CRL,
             f"valid from {iso(validity.not_before)} to {iso(validity.not_after)}: all participants are refused",
-            repair.run(view.root, "renew", note="then deploy"),
+            repair.renew(view.root, note="then deploy"),
         )  # fmt: skip

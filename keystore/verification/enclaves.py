@@ -96,14 +96,14 @@ def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Findi
             Severity.EXPOSURE, "borrowed-permissions", layout.ENCLAVES,
             f"on Cyclone DDS (every version so far) {indistinguishable(pairs)}: it compares subjects as "
             "bags of path segments",
-            repair.run(view.root, "renew", "--all", note="gives exact subjects"),
+            repair.renew(view.root, "--all", note="gives exact subjects"),
         )  # fmt: skip
     elif compatible:
         yield Finding(
             Severity.NOTE, "compatible-subjects", layout.ENCLAVES,
             f"{counted(len(compatible), 'enclave')} with SROS2's subjects (CN=/path); a new enclave could make their "
             "permissions borrowable on Cyclone DDS",
-            repair.run(view.root, "renew", *compatible, note="gives exact subjects"),
+            repair.renew(view.root, *compatible, note="gives exact subjects"),
         )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ class _EnclaveCheck:
         return self._finding(Severity.ERROR, code, file, message, self._renew())
 
     def _renew(self) -> str:
-        return repair.run(self._view.root, "renew", self._enclave)
+        return repair.renew(self._view.root, self._enclave)
 
     def _distrusted(self, code: str, message: str) -> Finding:
         again = repair.grant_again(self._view.root, self._enclave)
@@ -182,7 +182,7 @@ class _EnclaveCheck:
             yield from check_certificate_issued(self._view, self._register, self._enclave, self.facts)
         key = self._read(layout.KEY)
         if key is not None and not is_our_form(key):
-            fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys")
+            fix = repair.renew(self._view.root, self._enclave, "--new-keys")
             yield self._finding(
                 Severity.ERROR, "key", layout.KEY, f"not a usable private key: {NOT_OUR_FORM}", fix
             )
@@ -214,13 +214,13 @@ class _EnclaveCheck:
             )  # fmt: skip
         if facts.serial in self._revoked:
             remedy = (self._enclave, "--new-keys")
-            fix = repair.run(self._view.root, "renew", *remedy, note="or secure-keystore remove")
+            fix = repair.renew(self._view.root, *remedy, note="or secure-keystore remove")
             yield self._finding(Severity.ERROR, "revoked", layout.CERT, "revoked: peers refuse it", fix)
         if facts.can_sign_mail and self._view.shares_one_ca:
             yield self._finding(
                 Severity.EXPOSURE, "leaf-can-sign", layout.CERT,
                 "its key can sign permissions that older DDS versions accept (shared CA, no EKU)",
-                repair.run(self._view.root, "renew"),
+                repair.renew(self._view.root),
             )  # fmt: skip
 
     def _profile(self, facts: CertificateFacts) -> Iterator[Finding]:
@@ -248,7 +248,7 @@ class _EnclaveCheck:
             yield self.leaf(Severity.WARNING, "key-usage", text)
 
     def leaf(self, severity: Severity, code: str, message: str) -> Finding:
-        fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys", "--revoke-old")
+        fix = repair.renew(self._view.root, self._enclave, "--new-keys", "--revoke-old")
         return self._finding(severity, code, layout.CERT, message, fix)
 
     def _subject(self, facts: CertificateFacts) -> Iterator[Finding]:
@@ -308,9 +308,9 @@ class _EnclaveCheck:
         last = self._register.permissions(self._enclave) if self._register is not None else None
         twin = self._read(layout.PERMISSIONS_XML)
         if last is not None and twin is not None and fingerprint(twin) == last.document:
-            fix = repair.run(self._view.root, "renew", self._enclave, note="signs permissions.xml again")
+            fix = repair.renew(self._view.root, self._enclave, note="signs permissions.xml again")
         elif needs_register(self._view):
-            fix = repair.run(self._view.root, "renew", note="takes the keystore over")
+            fix = repair.renew(self._view.root, note="takes the keystore over")
         else:
             fix = repair.grant_again(self._view.root, self._enclave)
         return self._finding(Severity.ERROR, "other-form", layout.PERMISSIONS, str(error), fix)

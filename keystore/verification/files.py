@@ -103,7 +103,7 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
     if relative in _UNFINISHED:
         yield Finding(
             Severity.WARNING, "interrupted", relative, "an interrupted run left this behind",
-            repair.run(root, "renew", note="as any command that writes, completes or clears it"),
+            repair.renew(root, note="as any command that writes, completes or clears it"),
         )  # fmt: skip
         return
     yield from _check_owner(root, relative, info, private=relative.split("/")[0] == layout.PRIVATE)
@@ -322,14 +322,14 @@ def _decoded(data: bytes) -> Iterator[bytes]:
 
 def _new_key(root: Path, relative: str) -> str:
     enclave = _enclave_of(relative)
-    return repair.run(root, "renew", enclave, "--new-keys", "--revoke-old") if enclave else repair.BACKUP
+    return repair.renew(root, enclave, "--new-keys", "--revoke-old") if enclave else repair.BACKUP
 
 
 def _written_again(root: Path, relative: str) -> str:
     enclave = _enclave_of(relative)
     if not enclave or relative == layout.GOVERNANCE:
-        return repair.run(root, "renew", note="writes it again")
-    return repair.run(root, "renew", enclave)
+        return repair.renew(root, note="writes it again")
+    return repair.renew(root, enclave)
 
 
 def _enclave_of(relative: str) -> str:

@@ -80,7 +80,7 @@ def check_domains(root: Path, governance: Governance, granted: dict[str, Domains
                 Severity.ERROR, "domain-not-governed", layout.enclave_file(enclave, layout.PERMISSIONS),
                 f"permissions for domains {missing}, which the governance does not list: Cyclone DDS refuses the "
                 "participant there, Fast DDS each endpoint",
-                repair.run(root, "renew", enclave, note="or add the domains to the governance"),
+                repair.renew(root, enclave, note="or add the domains to the governance"),
             )  # fmt: skip
     used = {identifier for domains in granted.values() for identifier in _identifiers(domains)}
     idle = sorted(_identifiers(governance.domains()) - used)

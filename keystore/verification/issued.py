@@ -30,7 +30,7 @@ def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
     except KeystoreError as error:
         return None, [Finding(Severity.ERROR, "register", layout.REGISTER, str(error), repair.BACKUP)]
     if register is None and needs_register(view):
-        fix = repair.run(view.root, "renew", note="takes over what can still be known")
+        fix = repair.renew(view.root, note="takes over what can still be known")
         why = (
             "there is no register: revoked certificates and earlier files that were put back are not noticed"
         )
@@ -49,7 +49,7 @@ def check_anchors(
         yield Finding(
             Severity.ERROR, "foreign-ca", layout.ca_cert(role),
             f"holds a CA that this keystore did not make, or has retired: {describe(ca)}; whoever has its key can make "
-            "enclaves that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
+            "enclaves that Fast DDS lets in", repair.renew(view.root, note="once it is known who put it there"),
         )  # fmt: skip
     for role in Role:
         prefix = f"{role.use}="
@@ -85,7 +85,7 @@ def check_published(view: KeystoreView, register: Register | None, now: datetime
         yield Finding(
             Severity.ERROR, "crl-not-last", layout.CRL,
             f"{problem}: enclaves that were revoked since may talk again",
-            repair.run(view.root, "renew", note="publishes it again; then deploy"),
+            repair.renew(view.root, note="publishes it again; then deploy"),
         )  # fmt: skip
     present = set(view.enclaves())
     for enclave in sorted({one.enclave for one in register.certificates.values()} - present - {""}):
@@ -104,7 +104,7 @@ def check_certificate_issued(
     if register is None:
         return
     place = layout.enclave_file(enclave, layout.CERT)
-    again = repair.run(view.root, "renew", enclave, "--new-keys", "--revoke-old")
+    again = repair.renew(view.root, enclave, "--new-keys", "--revoke-old")
     known, held = register.certificates.get(facts.serial), register.in_force(enclave)
     if known is None or known.enclave != enclave or known.key != fingerprint(facts.public_key):
         why = "was not issued here: no certificate with this serial and key is in the register"

@@ -42,13 +42,13 @@ def _check(
 ) -> Iterator[Finding]:
     own, *others = refusals(ca, [ca, *below.values()], role)
     if own:
-        fix = repair.run(view.root, "renew", "--ca", "start", note="deploy; then --ca switch and --ca finish")
+        fix = repair.replace_ca(view.root, role)
         text = f"{_REFUSES} what this CA signs: {own}"
         yield Finding(Severity.ERROR, "ca-refused", layout.ca_cert(role), text, fix)
         return
     for enclave, why in zip(below, others, strict=True):
         if why:
             note = "or have the CA that issued it issue another: secure-keystore sign --issued"
-            fix = repair.run(view.root, "renew", enclave, note=note)
+            fix = repair.renew(view.root, enclave, note=note)
             place = layout.enclave_file(enclave, layout.CERT)
             yield Finding(Severity.ERROR, "certificate-refused", place, f"{_REFUSES} it: {why}", fix)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from enclave_common.command_line import CommandParser, one_of
+from enclave_common.command_line import FLAG, CommandParser, one_of
 from enclave_common.words import did_you_mean
 
 
@@ -59,3 +59,16 @@ def test_far_off_words_get_no_suggestion(capsys: pytest.CaptureFixture[str]) -> 
     with pytest.raises(SystemExit):
         parser().parse_args(["launch"])
     assert "did you mean" not in capsys.readouterr().err
+
+
+def test_an_option_of_another_verb_is_not_suggested(capsys: pytest.CaptureFixture[str]) -> None:
+    made = parser()
+    made.add_verb("list", "List them.").add_options((("--all", FLAG, ""),))
+    for words in (["verify", "--all"], ["list", "--formt", "json"]):
+        with pytest.raises(SystemExit):
+            made.parse_args(words)
+        told = capsys.readouterr().err
+        assert "did you mean" not in told and f"tool {words[0]}: error: unrecognized" in told
+    with pytest.raises(SystemExit):
+        made.parse_args(["list", "--al"])
+    assert "did you mean '--all'?" in capsys.readouterr().err

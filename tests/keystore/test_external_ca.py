@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -117,8 +118,52 @@ def test_without_permissions_a_new_enclave_may_do_nothing(
 
 
 def test_a_launch_says_which_enclaves_want_a_certificate(ks: Path) -> None:
-    with pytest.raises(SigningUnavailableError, match=r"identity_ca\.key\.pem|no CA keys"):
+    with pytest.raises(SigningUnavailableError, match="/arm: new enclave\nRequest them on their hosts"):
         provision(ks, [policy("/arm")], options=options())
+
+
+def test_what_is_advised_for_a_certificate_of_another_ca_works(
+    ks: Path,
+    external: ExternalCa,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = request(tmp_path / "host", ["/arm"])
+    (tmp_path / "csr").write_bytes(asked[0].pem)
+    bare = ("-CA", external.cert, "-CAkey", external.key, "-CAcreateserial", "-days", "90")
+    openssl("x509", "-req", "-in", tmp_path / "csr", *bare, "-out", tmp_path / "bare.pem")
+    accept_certificates(ks, asked, (tmp_path / "bare.pem").read_bytes())
+    found = {one.code: one.repair for one in verify(ks).findings}
+    assert set(found) == {"no-key-usage", "no-extended-key-usage", "no-ca-key"}
+    assert main(["renew", str(ks)]) == 0, "which cannot replace the certificate, and has nothing else to do"
+
+    on_the_host, here = found["no-key-usage"].split("  # on its host. ")
+    host = str(tmp_path / "host2")
+    assert main(shlex.split(on_the_host.replace("HOST_KEYSTORE", shlex.quote(host)))[1:]) == 0
+    requests = Path("requests.pem")
+    Path("issued.pem").write_bytes(external.issue(parse_requests(requests.read_bytes(), "requests"), days=90))
+    assert main(shlex.split(here.rpartition("Then here: ")[2])[1:]) == 0
+    assert {one.code for one in verify(ks).findings} == {"no-ca-key"}
+
+    capsys.readouterr()
+    assert main(["renew", str(ks), "/arm"]) == 1
+    assert "--issued issued.pem" in capsys.readouterr().err, "and never the advice to find CA keys"
+
+
+def test_a_host_without_ca_keys_is_never_advised_to_renew(
+    ks: Path, external: ExternalCa, tmp_path: Path
+) -> None:
+    asked = request(tmp_path / "host", NAMES)
+    accept_certificates(ks, asked, external.issue(asked))
+    carried(ks, tmp_path)
+    host = (tmp_path / "host").resolve()
+    (host / "enclaves/arm/permissions.xml").write_text("garbled")
+    faults = [one for one in verify(tmp_path / "host").findings if one.severity is Severity.ERROR]
+    assert faults and all(
+        one.repair.startswith(f"secure-keystore import {tmp_path / 'host'} HOST.bundle") for one in faults
+    )
 
 
 def refused(ks: Path, asked: tuple[Request, ...], issued: bytes, told: str) -> None:
