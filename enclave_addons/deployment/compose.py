@@ -7,6 +7,7 @@ Bind mounts, because podman-compose ignores ``configs`` and Compose ignores owne
 
 from __future__ import annotations
 
+import shlex
 from typing import Any
 
 from enclave_addons.deployment.deployment import Deployment, File
@@ -29,7 +30,7 @@ def compose_files(
     content: dict[str, Any] = {"name": deployment.name, "services": services}
     if not host_network:
         content["networks"] = {"dds": {"internal": True}}
-    note = f"# Before: secure-keystore import {keystore} HOST.bundle --owner {user}\n"
+    note = f"# Before: secure-keystore import {shlex.quote(keystore)} HOST.bundle --owner {user}\n"
     files = {"compose.yaml": File(deployment.header() + note + yaml_text(content))}
     for process in deployment.processes:
         files |= deployment.parameter_files(process)

@@ -83,6 +83,7 @@ class LiveHost(Host):
         """Write it readable by us alone, and keep it until the launch ends: a respawned node reads it again."""
         if self._parameter_directory is None:
             self._parameter_directory = Path(tempfile.mkdtemp(prefix="launch_params_"))
+            self._tree.send("remove_at_end", 0, str(self._parameter_directory))
         path = self._parameter_directory / f"{len(self._parameter_files) + 1}.yaml"
         path.write_text(text, encoding="utf-8")
         self._parameter_files[str(path)] = text

@@ -25,6 +25,7 @@ Messages are marshalled tuples behind a four-byte length. ``id`` is the launcher
                          ("signal", id, number)          to the process group of the child
                          ("signal_one", id, number)      to the child alone
                          ("sweep", id, pid)              SIGKILL to what it left running when it ended
+                         ("remove_at_end", 0, folder)    when the launcher is gone: parameter files
     warden -> launcher   ("started", id, pid) | ("failed", id, errno, file) | ("exited", id, returncode)
                          ("interrupted", id)             Ctrl-C was given to the child that had the terminal
 """
@@ -39,6 +40,7 @@ import fcntl
 import marshal
 import os
 import select
+import shutil
 import signal
 import socket
 import struct
@@ -125,6 +127,7 @@ class Warden:
         self.descriptors: list[int] = []
         self.pids: dict[int, int] = {}  # id -> pid, of children that have not been reaped
         self.identifiers: dict[int, int] = {}  # pid -> id
+        self.folders: list[str] = []  # removed at the end
 
     def run(self) -> None:
         wakeup, wakeup_writer = os.pipe()
@@ -188,6 +191,8 @@ class Warden:
             self.signal_one(identifier, rest[0])
         elif kind == "sweep":
             self.sweep(rest[0])
+        elif kind == "remove_at_end":
+            self.folders.append(rest[0])
 
     def send(self, *message: str | int | bytes) -> None:
         data = marshal.dumps(message)
@@ -411,6 +416,8 @@ def main() -> None:
         warden.run()
     finally:
         warden.end_everything()
+        for folder in warden.folders:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":

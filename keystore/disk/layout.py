@@ -12,7 +12,7 @@ All paths here are POSIX text relative to the keystore, so that they read the sa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 
 from keystore.formats.enclave_name import flat_name, segments, validate_enclave_name
@@ -68,6 +68,16 @@ RUNTIME_FILES = (
     "identity_ca.cert.pem", CERT, KEY, "permissions_ca.cert.pem", ENCLAVE_GOVERNANCE, PERMISSIONS,
 )  # fmt: skip
 """What a process needs to start (rmw_dds_common security.cpp): all six, or none."""
+
+
+def read_by_processes(enclaves: Iterable[str]) -> Iterator[str]:
+    """Yield the folders and files that processes in these enclaves read; some may be missing."""
+    yield from ("", PUBLIC, *(ca_cert(role) for role in Role), *CA_LINKS, CRL, ENCLAVES, GOVERNANCE)
+    for enclave in enclaves:
+        folder = enclave_directory(enclave)
+        parts = folder.split("/")
+        yield from ("/".join(parts[:count]) for count in range(2, len(parts) + 1))
+        yield from (f"{folder}/{name}" for name in (*RUNTIME_FILES, ENCLAVE_CRL))
 
 
 def ca_cert(role: Role) -> str:

@@ -6,6 +6,7 @@ import errno
 import os
 import shlex
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 
 from keystore.disk import layout
@@ -28,6 +29,20 @@ def resolve_root(keystore: Path | str) -> Path:
         return Path(os.path.realpath(keystore))
     except ValueError:
         raise NotAKeystoreError(f"{printable(keystore)} is not a path") from None
+
+
+def folders_of_links(keystore: Path | str) -> list[Path]:
+    """Return the folder of each link that leads to the keystore: who can write there can redirect the link."""
+    folders: list[Path] = []
+    waiting = [Path(os.path.abspath(keystore))]
+    while waiting:
+        path = waiting.pop()
+        for place in (path, *path.parents):
+            folder = Path(os.path.realpath(place.parent))
+            if place.is_symlink() and folder not in folders:
+                folders.append(folder)
+                waiting.append(folder / os.readlink(place))
+    return folders
 
 
 def read(root: Path, relative: str) -> bytes:
@@ -156,6 +171,34 @@ def private_problem(path: Path | str, info: os.stat_result) -> str | None:
     return (
         f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
     )
+
+
+def is_trusted_owner(info: os.stat_result) -> bool:
+    """Return True for what belongs to us or to the administrator."""
+    return info.st_uid in (0, os.geteuid())
+
+
+def refuse_foreign_owner(root: Path, enclaves: Iterable[str]) -> None:
+    """Refuse to start from files of another user, who can change them at any time.
+
+    Args:
+        root: The resolved path of the keystore.
+        enclaves: The enclaves that processes are about to use.
+
+    Raises:
+        UnsafeKeystoreError: A folder or file that these processes read belongs to another user.
+    """
+    for relative in layout.read_by_processes(enclaves):
+        try:
+            info = os.lstat(f"{root}/{relative}")
+        except OSError:
+            continue  # the checks of content report what is missing
+        if not is_trusted_owner(info):
+            place = root / relative
+            raise UnsafeKeystoreError(
+                f"{printable(place)} belongs to user {info.st_uid}, who can change it at any time: run as that user, "
+                f"or take the keystore over: chown -R {os.geteuid()} {shlex.quote(str(root))}"
+            )
 
 
 def close_to_others(root: Path) -> str:

@@ -13,7 +13,7 @@ from keystore.disk import layout
 from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.deployed import deployment_problem, refuse_changed_deployment
 from keystore.disk.register_file import needs_register, read_register, refuse_foreign_authorities
-from keystore.disk.safe_files import resolve_root
+from keystore.disk.safe_files import refuse_foreign_owner, resolve_root
 from keystore.disk.signed_documents import governance_domains, governance_stands
 from keystore.disk.view import KeystoreView
 from keystore.errors import SigningUnavailableError, printable
@@ -126,6 +126,7 @@ def differences(
     view.require_complete()
     now = chosen.now or utc_now()
     view.refuse_clock(now)
+    refuse_foreign_owner(root, [policy.path])
     register = read_register(root)
     refuse_foreign_authorities(view, register)
     wanted = wanted_enclave(root, policy, chosen)

@@ -19,7 +19,7 @@ from enclave_common.words import counted, some_of
 from keystore.add_ons import follow
 from keystore.disk import layout, store
 from keystore.disk.register_file import refuse_foreign_authorities
-from keystore.disk.safe_files import resolve_root
+from keystore.disk.safe_files import refuse_foreign_owner, resolve_root
 from keystore.disk.share_files import read_shares
 from keystore.disk.signed_documents import governance_domains, governance_in_force
 from keystore.disk.store import Batch, Store
@@ -50,7 +50,8 @@ from keystore.steps.governance import governance_for, renew_governance
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import given_up, left_over, refuse_running, shares_in_use
-from keystore.verification.files import check_parents
+from keystore.verification.files import check_links, check_parents
+from keystore.verification.finding import Finding
 from keystore.verification.governance import weaknesses
 
 
@@ -81,7 +82,7 @@ def provision(
         report = report._replace(warnings=(*report.warnings, *_left_over(root, chosen.launch.owner, gone)))
     else:
         drop_share_files(root, [policy.path for policy in policies], chosen)
-    return report
+    return report._replace(warnings=(*report.warnings, *_replaceable(check_links(keystore))))
 
 
 def _left_over(root: Path, owner: str, shares: Mapping[str, bool]) -> Iterator[str]:
@@ -127,6 +128,7 @@ def bring_about(
     now = options.now or utc_now()
     if options.now is None and not options.accept_clock:
         refuse_clock_before_program(now, printable(root))
+    refuse_foreign_owner(root, wanted)
     if (report := compare(root, wanted, options, now)) is None:
         report = reconcile(root, wanted, options, now)
         report = report._replace(warnings=(*report.warnings, *follow(root, options)))
@@ -354,6 +356,12 @@ def _write_all(
     return tuple(reports.values())
 
 
+def _replaceable(folders: Iterable[Finding]) -> Iterator[str]:
+    for finding in folders:
+        if finding.severity.fails:
+            yield f"{finding.place} {finding.message}; {finding.repair}"
+
+
 def exposures(view: KeystoreView) -> Iterator[str]:
     """Yield what works and exposes the keystore all the same; a cheap part of ``verify``, without an XML parser."""
     if not view.is_complete:
@@ -369,9 +377,7 @@ def exposures(view: KeystoreView) -> Iterator[str]:
             "the CA keys can be read by others; secure-keystore renew closes them. Whoever read them can make any "
             "enclave: secure-keystore renew --ca start replaces them"
         )
-    for finding in check_parents(view.root):
-        if finding.severity.fails:
-            yield f"{finding.place} {finding.message}; {finding.repair}"
+    yield from _replaceable(check_parents(view.root))
     with suppress(KeystoreError):
         for weakness in weaknesses(governance_in_force(view)):
             yield f"the governance is weaker than the default: {weakness}"

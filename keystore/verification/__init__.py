@@ -22,7 +22,7 @@ from keystore.signing.ca_access import CaAccess
 from keystore.verification import repair
 from keystore.verification.authorities import check_authorities
 from keystore.verification.enclaves import check_enclaves
-from keystore.verification.files import check_files, check_parents
+from keystore.verification.files import check_files, check_links, check_parents
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
 from keystore.verification.issued import check_anchors, check_published, load_register
@@ -64,6 +64,7 @@ def verify(
             view = keystore_at(keystore)
             before = _register_file(view)
             found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))
+            found.extend(check_links(keystore))
             if not found or _register_file(view) == before:
                 break  # otherwise a command wrote in between, and files of two states were compared
     found.sort(key=lambda finding: (order.index(finding.severity), finding.place, finding.code))

@@ -182,7 +182,7 @@ def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bo
     if problem is not None:
         fix = safe_files.private_repair(path, info)
         yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, fix)
-    elif not private and not _is_trusted(info):
+    elif not private and not safe_files.is_trusted_owner(info):
         yield Finding(
             Severity.ERROR, "foreign-owner", relative,
             f"belongs to user {info.st_uid}, who can change it at any time",
@@ -221,30 +221,38 @@ def _holds_key(path: Path) -> bool:
 
 
 def check_parents(root: Path) -> Iterator[Finding]:
-    """Check the folders above: who can rename one of them can put another keystore in its place."""
-    for parent in root.parents:
-        try:
-            info = os.stat(parent)
-        except OSError:
-            continue
-        if not _is_trusted(info):
-            yield Finding(
-                Severity.ERROR, "replaceable", str(parent),
-                f"belongs to user {info.st_uid}, who can put another keystore in this place",
-                f"put the keystore elsewhere, or: chown root {shlex.quote(str(parent))}",
-            )  # fmt: skip
-        elif info.st_mode & 0o022 and not info.st_mode & stat.S_ISVTX:
-            everybody = bool(info.st_mode & stat.S_IWOTH)
-            yield Finding(
-                Severity.ERROR if everybody else Severity.WARNING, "replaceable", str(parent),
-                f"{'everybody' if everybody else f'group {info.st_gid}'} can write in it (mode "
-                f"{safe_files.mode_text(info)}) and put another keystore in this place",
-                f"chmod go-w {shlex.quote(str(parent))}",
-            )  # fmt: skip
+    """Check the folders above a keystore: who can rename one of them can put another keystore in its place."""
+    for folder in root.parents:
+        yield from _check_folder(folder)
 
 
-def _is_trusted(info: os.stat_result) -> bool:
-    return info.st_uid in (0, os.geteuid())
+def check_links(keystore: Path | str) -> Iterator[Finding]:
+    """Check the folders of the links that lead to a keystore, as ``check_parents`` checks those above it."""
+    above = Path(os.path.realpath(keystore)).parents
+    for folder in safe_files.folders_of_links(keystore):
+        if folder not in above:
+            yield from _check_folder(folder)
+
+
+def _check_folder(folder: Path) -> Iterator[Finding]:
+    try:
+        info = os.stat(folder)
+    except OSError:
+        return
+    if not safe_files.is_trusted_owner(info):
+        yield Finding(
+            Severity.ERROR, "replaceable", str(folder),
+            f"belongs to user {info.st_uid}, who can put another keystore in this place",
+            f"put the keystore elsewhere, or: chown root {shlex.quote(str(folder))}",
+        )  # fmt: skip
+    elif info.st_mode & 0o022 and not info.st_mode & stat.S_ISVTX:
+        everybody = bool(info.st_mode & stat.S_IWOTH)
+        yield Finding(
+            Severity.ERROR if everybody else Severity.WARNING, "replaceable", str(folder),
+            f"{'everybody' if everybody else f'group {info.st_gid}'} can write in it (mode "
+            f"{safe_files.mode_text(info)}) and put another keystore in this place",
+            f"chmod go-w {shlex.quote(str(folder))}",
+        )  # fmt: skip
 
 
 _MAX_BYTES = 64_000_000

@@ -415,6 +415,42 @@ def test_what_belongs_to_another_user_is_an_error(name: str, present: Path, tmp_
     assert codes & {"foreign-owner", "unsafe-owner"}
 
 
+@pytest.mark.parametrize("name", GIVEN_AWAY)
+def test_a_start_refuses_what_belongs_to_another_user(name: str, present: Path, tmp_path: Path) -> None:
+    from keystore import UnsafeKeystoreError, provision
+
+    root = copy_of(present, tmp_path)
+    provision(root, [policy("/a", "/chatter")], options=options())
+    of_another_user(name)(root)
+    with pytest.raises(UnsafeKeystoreError, match=r"belongs to user 65534.*chown -R 0"):
+        provision(root, [policy("/a", "/chatter")], options=options())
+    if name.startswith("enclaves/a"):  # that of another enclave is no concern of this start
+        provision(root, [policy("/b", "/chatter")], options=options())
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o755], ids=["open", "closed"])
+def test_the_folder_of_a_link_is_judged_as_the_folders_above(
+    mode: int, present: Path, tmp_path: Path
+) -> None:
+    from keystore import provision
+
+    root = copy_of(present, tmp_path)
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "shared").chmod(mode)
+    link = tmp_path / "shared" / "ks"
+    link.symlink_to(root)
+    second = tmp_path / "second"
+    second.symlink_to(link)
+    is_open = mode == 0o777
+    for given in (link, second):
+        assert {(finding.code, finding.place) for finding in verify(given).findings} == (
+            {("replaceable", str(tmp_path / "shared"))} if is_open else set()
+        )
+        report = provision(given, [policy("/a", "/chatter")], options=options())
+        assert any("put another keystore in this place" in text for text in report.warnings) is is_open
+    assert verify(root).is_good
+
+
 @pytest.mark.parametrize("name", HARMLESS)
 def test_what_harms_nobody_stays_good(name: str, present: Path, tmp_path: Path) -> None:
     root = copy_of(present, tmp_path)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -122,3 +124,19 @@ def test_it_ends_with_its_launcher(root: Path) -> None:
     chosen.signing._channel.close()
     with pytest.raises(SigningUnavailableError, match="has ended"):
         provision(root, [policy("/a")], options=chosen)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="prctl(2) is Linux's")
+@pytest.mark.parametrize("reads", [True, False], ids=["reads a secret", "reads none"])
+def test_a_process_that_reads_a_secret_leaves_no_core_dump(reads: bool, tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("of the CA\n")
+    program = f"""
+import ctypes, pathlib
+from keystore import Secret
+secret = Secret(file=pathlib.Path({str(tmp_path / "secret")!r}))
+if {reads}:
+    secret.value()
+print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0))  # PR_GET_DUMPABLE
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == ("0\n" if reads else "1\n")

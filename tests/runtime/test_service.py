@@ -10,6 +10,7 @@ import pty
 import re
 import select
 import signal
+import stat
 import subprocess
 import sys
 import textwrap
@@ -404,6 +405,30 @@ def test_killing_the_launcher_leaves_nobody(tmp_path: Path) -> None:
     launch.process.kill()
     launch.process.wait()
     assert eventually(lambda: not any(map(alive, pids)))
+
+
+def test_killing_the_launcher_leaves_no_parameter_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    marker = tmp_path / "prefix/share/ament_index/resource_index/packages/robot"
+    program = tmp_path / "prefix/lib/robot/driver"
+    for path in (marker, program):
+        path.parent.mkdir(parents=True)
+    marker.touch()
+    program.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid; exec sleep 60\n")
+    program.chmod(0o755)
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    node = 'Node(package="robot", executable="driver", parameters=[{"password": "letmein"}])'
+    launch = Launch(tmp_path, node, prelude="from launch_ros.actions import Node")
+    read_pid(tmp_path / "pid")
+    (written,) = temporary.glob("launch_params_*/*")
+    assert "letmein" in written.read_text() and stat.S_IMODE(written.parent.stat().st_mode) == 0o700
+    launch.process.kill()
+    launch.process.wait()
+    assert eventually(lambda: not list(temporary.iterdir()))
 
 
 def test_an_error_in_the_visit_ends_what_was_started_before_it(tmp_path: Path) -> None:

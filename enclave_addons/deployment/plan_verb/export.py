@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -43,6 +44,7 @@ from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import ManifestError, UsageError
 from keystore.disk.store import write_new
 
+_USER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(:[A-Za-z0-9_][A-Za-z0-9_.-]*)?")
 ENGINES = ("systemd", "compose", "kubernetes")
 
 
@@ -98,6 +100,8 @@ def run(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> None:
     if options.format != "systemd" and not options.image:
         raise UsageError(f"--format {options.format} needs --image")
+    if not _USER.fullmatch(options.user):
+        raise UsageError(f"--user {options.user!r}: UID:GID or NAME:GROUP is needed")
     paths = [("--host-keystore", options.host_keystore), *(("--setup", file) for file in options.setup)]
     for name, path in paths:
         if not path.startswith("/") or not path.isprintable() or " " in path or ":" in path:
