@@ -159,7 +159,9 @@ def upstream_name(module: str, name: str) -> str:
 
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
-FALLBACK_NAMES = ("lifecycle_msgs", "nav2_common", "rclpy", "xacro")
+FALLBACK_NAMES = (
+    *("launch_param_builder", "lifecycle_msgs", "moveit_configs_utils", "nav2_common", "rclpy", "xacro"),
+)
 """Taken over only where the package is not installed: many launch files of robots import these."""
 
 _depth = 0

@@ -255,18 +255,40 @@ PATHS: dict[str, dict[str, str]] = {
     "lifecycle_msgs": {
         "msg": "lifecycle_msgs: | State Transition TransitionEvent",
     },
+    "launch_param_builder": {
+        "launch_param_builder": "stand_ins.launch_param_builder: ParameterBuilder",
+        "utils": (
+            "stand_ins.launch_param_builder: ParameterBuilderFileNotFoundError ParameterValueType get_path "
+            "load_file load_xacro load_yaml raise_if_file_not_found"
+        ),
+    },
+    "moveit_configs_utils": {
+        "launch_utils": "stand_ins.moveit_launches: | DeclareBooleanLaunchArg add_debuggable_node",
+        "launches": (
+            "stand_ins.moveit_launches: | DeclareBooleanLaunchArg add_debuggable_node generate_demo_launch "
+            "generate_move_group_launch generate_moveit_rviz_launch generate_rsp_launch "
+            "generate_setup_assistant_launch generate_spawn_controllers_launch "
+            "generate_static_virtual_joint_tfs_launch generate_warehouse_db_launch"
+        ),
+        "moveit_configs_builder": (
+            "stand_ins.moveit_configs: MoveItConfigs MoveItConfigsBuilder | get_pattern_matches"
+        ),
+    },
+    "moveit_configs_utils.substitutions": {
+        "xacro": "stand_ins.moveit_configs: Xacro",
+    },
     "nav2_common": {},
     "nav2_common.launch": {
-        "has_node_params": "nav2_common: HasNodeParams",
-        "launch_config_as_bool": "nav2_common: LaunchConfigAsBool",
-        "replace_string": "nav2_common: ReplaceString",
-        "rewritten_yaml": "nav2_common: RewrittenYaml",
+        "has_node_params": "stand_ins.nav2_common: HasNodeParams",
+        "launch_config_as_bool": "stand_ins.nav2_common: LaunchConfigAsBool",
+        "replace_string": "stand_ins.nav2_common: ReplaceString",
+        "rewritten_yaml": "stand_ins.nav2_common: RewrittenYaml",
     },
     "rclpy": {
-        "logging": "rclpy_logging: | LoggingSeverity get_logger get_logger_effective_level set_logger_level",
+        "logging": "stand_ins.rclpy_logging: | LoggingSeverity get_logger get_logger_effective_level set_logger_level",
     },
     "xacro": {
-        "": "xacro: parse process_doc process_file",
+        "": "stand_ins.xacro: parse process_doc process_file",
     },
 }
 

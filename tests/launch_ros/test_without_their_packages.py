@@ -186,10 +186,29 @@ def test_the_program_xacro_does_what_its_package_would(
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     found = launched(FILE.format(before=before, parameters="{'p': d.toxml()}"), syntax="py")
-    assert found.processes[0].parameters == {"p": "<robot name='/a.xacro'/>\n"}
+    assert found.processes[0].parameters == {"p": '<?xml version="1.0" ?><robot name="/a.xacro"/>'}
     wrong = FILE.format(before=before.replace("left", "right"), parameters="{'p': d.toxml()}")
     with pytest.raises(EvaluationError, match=r"xacro /a\.xacro failed: no arm"):
         launched(wrong, syntax="py")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [('<robot name="a">\n <link name="b" id="&lt;"/>\n <!-- c -->\n <p> d </p>\n</robot>',
+      '<robot name="a"><link id="&lt;" name="b"/><!-- c --><p> d </p></robot>'),
+     ('<?xml version="1.0"?>\n<robot/>', "<robot/>")],
+)  # fmt: skip
+def test_a_file_without_xacro_in_it_needs_no_program(
+    launched: Evaluate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, expected: str
+) -> None:
+    """As xacro 2.1 writes it, below a banner of four comments."""
+    monkeypatch.setenv("PATH", "/nowhere")
+    (tmp_path / "a.urdf").write_text(text)
+    before = f"import xacro; d = xacro.process_file('{tmp_path}/a.urdf')"
+    found = launched(FILE.format(before=before, parameters="{'p': d.toxml()}"), syntax="py").processes[0]
+    description = str(found.parameters["p"])
+    assert description.startswith('<?xml version="1.0" ?><!-- =====')
+    assert description.rpartition(" -->" if "c" not in expected else "== -->")[2] == expected
 
 
 @pytest.mark.parametrize("before", XACRO)
