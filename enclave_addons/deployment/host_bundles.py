@@ -6,21 +6,23 @@ The manifest signed last is used again if nothing changed; a new one gets a high
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from enclave_addons.deployment.bundle_file import bundle_bytes
+from enclave_addons.deployment.bundle_file import bundle_bytes, read_bundle
 from enclave_addons.deployment.hosts import Hosts, refuse_host_name
 from enclave_addons.deployment.public_files import files_of, refuse_unfit
+from enclave_common.words import some_of
 from keystore.disk import layout, safe_files, store
-from keystore.disk.crl_file import crl_number, crl_validity
+from keystore.disk.crl_file import crl_number, crl_validity, forgotten, listed_in
 from keystore.disk.register_file import read_register
 from keystore.disk.store import Content, Store, write_new
 from keystore.disk.versions import written_aside
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, printable, storage_errors
+from keystore.errors import InvalidInputError, KeystoreError, UnsafeKeystoreError, printable, storage_errors
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin
 from keystore.formats.certificate import read_certificate
 from keystore.formats.register import Register
@@ -130,8 +132,29 @@ def _export(
             batch.file(layout.signed_bundle(host), signed, store.PRIVATE_MODE)
     else:
         manifest, signed = present
+    _refuse_forgotten(output / f"{host}{SUFFIX}", view)
     content = bundle_bytes(signed, {name: file.data for name, file in files.items()})
     return HostBundle(_write(output, host, content, opened.root), manifest, is_new)
+
+
+def _refuse_forgotten(earlier: Path, view: KeystoreView) -> None:
+    """Raise for a CRL that lacks what the bundle to be replaced lists: this keystore was restored from a backup."""
+    issuers = view.ca_bundle(Role.IDENTITY)
+    try:
+        sealed = read_bundle(earlier)
+        manifest = parse_manifest(smime.read(sealed.signed, sealed.place).document, sealed.place)
+        listed = sealed.opened(manifest).get(layout.CRL, b"")
+    except KeystoreError:
+        return  # there is none, or a file that no host would import
+    known = listed_in(listed, issuers, printable(earlier))
+    present = listed_in(safe_files.read_if_there(view.root, layout.CRL) or b"", issuers, layout.CRL)
+    if missing := forgotten(known, present):
+        serials = some_of([f"{serial:X}" for serial in missing], 8)
+        raise UnsafeKeystoreError(
+            f"the CRL of this keystore does not list {serials}, which {printable(earlier)} lists as revoked: the "
+            f"keystore was restored from a backup. Take the list of host {manifest.host} over, its public/crl.pem: "
+            f"secure-keystore renew {shlex.quote(str(view.root))} --adopt-crl FILE"
+        )
 
 
 def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:

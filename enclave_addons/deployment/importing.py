@@ -27,7 +27,7 @@ from keystore.disk.container_copies import (
     differing_copies,
     give_to,
 )
-from keystore.disk.crl_file import listed_in
+from keystore.disk.crl_file import forgotten, listed_in
 from keystore.disk.deployed import differing_files, read_manifest
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
@@ -292,8 +292,7 @@ def _refuse_forgotten(found: _Bundle, present: KeystoreView) -> None:
         return
     given = found.files.get(layout.CRL)
     coming = listed_in(given, present.ca_bundle(Role.IDENTITY), layout.CRL) if given is not None else None
-    missing = sorted(set(known.revoked) - set(coming.revoked if coming is not None else ()))
-    if missing:
+    if missing := forgotten(known, coming):
         listed = some_of([f"{serial:X}" for serial in missing], 8)
         raise UnsafeKeystoreError(
             f"{found.place}: its CRL does not list {listed}, which this host "

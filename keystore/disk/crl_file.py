@@ -107,6 +107,12 @@ def listed_in(pem: bytes, issuers: Iterable[CertificateFacts], place: str) -> Li
     return ListedCrl(place, issuer, _number(crl), revoked)
 
 
+def forgotten(known: ListedCrl | None, coming: ListedCrl | None) -> tuple[int, ...]:
+    """Return the serial numbers of ``known`` that a later list lacks: a CA's later lists have all that it revoked."""
+    later = coming.revoked if coming is not None else {}
+    return tuple(sorted(set(known.revoked) - set(later))) if known is not None else ()
+
+
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
     """Read the CRL. Raises DamagedKeystoreError unless the file is exactly a CRL that the identity CA signed."""
     return read_crl(

@@ -194,6 +194,25 @@ def test_a_ca_restored_from_a_backup_does_not_take_revocations_back(
         renew(ca, options=RenewOptions(adopt_crl=other / layout.CRL, provisioning=options()))
 
 
+def test_a_ca_restored_from_a_backup_does_not_replace_a_bundle_that_revokes_more(
+    ca: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(ca, tmp_path / "backup", symlinks=True)
+    remove(ca, ["/base/camera"], options=RemoveOptions(durable=False))
+    bundle = exported(ca, tmp_path / "out").path
+    content = bundle.read_bytes()
+    revoking = (ca / layout.CRL).read_bytes()
+    exported_later(ca, tmp_path / "out")  # the same list again is no loss
+    shutil.rmtree(ca)
+    shutil.copytree(tmp_path / "backup", ca, symlinks=True)
+    with pytest.raises(UnsafeKeystoreError, match=r"restored from a backup.*--adopt-crl FILE"):
+        exported_later(ca, tmp_path / "out")
+    assert bundle.read_bytes() == content
+    (tmp_path / "crl.pem").write_bytes(revoking)
+    renew(ca, ["/base"], options=RenewOptions(adopt_crl=tmp_path / "crl.pem", provisioning=options()))
+    exported_later(ca, tmp_path / "out")
+
+
 @pytest.mark.parametrize("damage", ["deleted", "damaged"])
 def test_without_its_manifest_an_imported_keystore_is_nothing(
     ca: Path, host: Path, tmp_path: Path, damage: str
