@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, MutableMapping
+from collections.abc import Iterable, MutableMapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from enclave_launch.description import read_only
@@ -41,9 +41,8 @@ class ContextState(NamedTuple):
 class Locals:
     """Read-only attribute access to the locals of the event being handled."""
 
-    def __init__(self, values: dict[str, Any], names_read: Callable[[str], None]) -> None:
+    def __init__(self, values: dict[str, Any]) -> None:
         self.__dict__["_values"] = values
-        self.__dict__["_names_read"] = names_read
 
     def __getattr__(self, key: str) -> Any:
         values: dict[str, Any] = self.__dict__["_values"]
@@ -51,7 +50,6 @@ class Locals:
             raise AttributeError(
                 f"context.locals does not contain attribute '{key}', it contains: [{', '.join(values)}]"
             )
-        self.__dict__["_names_read"](key)
         return values[key]
 
     def __setattr__(self, key: str, value: object) -> None:
@@ -86,7 +84,6 @@ class LaunchContext:
         self.__locals: dict[str, Any] = {}
         self.__locals_stack: list[dict[str, Any]] = []
         self.__combined: dict[str, Any] | None = None
-        self.event_read = False  # by code that asks about the event being handled
         self.configurations_read: set[str] = set()
         self.__launch_configurations: dict[str, Any] = WatchedConfigurations(self.configurations_read)
         self.__configurations_stack: list[dict[str, Any]] = []
@@ -160,11 +157,7 @@ class LaunchContext:
 
     @property
     def locals(self) -> Locals:
-        return Locals(self.get_locals_as_dict(), self.__note_read)
-
-    def __note_read(self, key: str) -> None:
-        if key in self.__locals and not key.startswith("current_launch_file_"):
-            self.event_read = True
+        return Locals(self.get_locals_as_dict())
 
     # Environment: ``os.environ`` itself, as Python launch files rely on it
 

@@ -23,9 +23,7 @@ def command_stderr(message: str, command: str) -> Diagnostic:
 
 def function_called_again(function: str, event: str, location: SourceLocation) -> Diagnostic:
     """Report a function of the launch file that planning called and ``event`` will call again."""
-    text = (
-        f"{function} is called for the plan, to know what it starts, and again at {event}: it started nothing"
-    )
+    text = f"{function} is called for the plan, to know what it starts, and again at {event}"
     remedy = "make sure that calling it earlier does no harm"
     return Diagnostic(Code.FUNCTION_CALLED_AGAIN, function, text, location, remedy)
 

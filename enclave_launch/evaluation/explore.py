@@ -25,7 +25,7 @@ from enclave_launch.description.location import location_of, place_of
 from enclave_launch.description.visit import AND_THEN, chain, run_handler
 from enclave_launch.evaluation.error_text import error_text
 from enclave_launch.frontend import error_location
-from enclave_launch.host.user_code import only_acts
+from enclave_launch.host.user_code import starts_nothing
 from enclave_launch.process import Reaction, Unforeseeable
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError
 
@@ -113,7 +113,7 @@ class Explorer:
         self._note(handler, event)
         mark = chain(mark, _label(handler, event))
         if id(event) in self._made_up and handler.computes() and not _is_ours(handler):
-            if only_acts(getattr(handler, "callback", None)):
+            if starts_nothing(getattr(handler, "callback", None)):
                 return
             self._host.unforeseeable(
                 Unforeseeable(f"what a callback returns for {mark}", self._place(handler))

@@ -84,9 +84,6 @@ class UserCodeResults(Protocol):
         key: Hashable,
         function: Callable[[], T],
         context: LaunchContext | None = None,
-        *,
-        at_event: bool = False,
-        worth: Callable[[T], bool] = ...,
     ) -> T:
         """Call ``function``, or return what it gave when it was called with ``key`` before."""
 
@@ -194,8 +191,11 @@ class Host(ABC):
     def run_command(
         self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
     ) -> CommandResult:
-        """Run it; with ``--allow-missing-packages`` a marked placeholder stands for what it would write if the program,
-        or a package with a file that it is given, is not installed."""
+        """Run it, once for plan and start together unless ``at_event``.
+
+        With ``--allow-missing-packages`` a marked placeholder stands for its output if the program, or a package with a
+        file that it is given, is not installed.
+        """
         if not self.allow_missing_packages or not command:
             return self._run_command(command, merge_stderr, at_event)
         program = os.path.basename(command[0])
@@ -214,12 +214,10 @@ class Host(ABC):
         return result
 
     def _run_command(self, command: Sequence[str], merge_stderr: bool, at_event: bool) -> CommandResult:
-        if self.user_code_results is None:
+        if self.user_code_results is None or at_event:
             return self._run_now(command, merge_stderr)
         key = ("command", tuple(command), merge_stderr)
-        return self.user_code_results.call(
-            key, lambda: self._run_now(command, merge_stderr), at_event=at_event, worth=_succeeded
-        )
+        return self.user_code_results.call(key, lambda: self._run_now(command, merge_stderr))
 
     def _run_now(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
         result = subprocess.run(
@@ -302,11 +300,6 @@ class Host(ABC):
     @abstractmethod
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Record something only known at run time."""
-
-
-def _succeeded(result: CommandResult) -> bool:
-    """Return True for a result to record; a command that failed for the plan may succeed at its event."""
-    return result.returncode == 0 and not result.stderr
 
 
 Key = tuple[type, str]

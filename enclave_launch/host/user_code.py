@@ -1,14 +1,17 @@
-"""Call the user's code: once for plan and start together (``user_code_results``), and for a plan only where the plan
-learns something from it.
+"""Call the user's code.
+
+What is called while the file is visited is called once for plan and start together (``user_code_results``). What an
+event or a timer calls depends on that moment: it is called for the plan, to know what it
+starts, and again at its event.
 """
 
 from __future__ import annotations
 
-import dis
+import ast
 import inspect
-from collections.abc import Callable, Hashable, Iterable
+import textwrap
+from collections.abc import Callable, Hashable
 from functools import wraps
-from types import CodeType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from enclave_launch.description.events.event import Shutdown
@@ -31,15 +34,13 @@ def is_users(function: object) -> bool:
 def called_once(
     owner: object, function: object, call: Callable[[], T], context: LaunchContext, *more: Hashable
 ) -> T:
-    """Return ``call()``, which calls ``function`` of ``owner``; the user's is called once for plan and start together.
-
-    At an event, the result of the plan is used if all that the function read is unchanged.
-    """
+    """Return ``call()``, which calls ``function`` of ``owner``; the user's is called once for plan and start together,
+    unless an event calls it."""
     results = context.host.user_code_results
-    if results is None or not is_users(function):
+    if results is None or context.on_event is not None or not is_users(function):
         return call()
     key = (getattr(function, "__qualname__", ""), *results.keep(owner), *more)
-    return results.call(key, call, context, at_event=context.on_event is not None)
+    return results.call(key, call, context)
 
 
 def called_for_entities(
@@ -47,20 +48,18 @@ def called_for_entities(
 ) -> T | None:
     """Call, as ``called_once``, a function that returns entities.
 
-    A function from which a plan learns nothing is not called for it, nor one that a shutdown calls: it may remove what
-    is still needed. A function that was called for the plan and returned nothing is reported.
+    A plan does not call a function that starts nothing, nor one that a shutdown calls: it may remove what is still
+    needed. A function that an event calls for the plan is reported, since it is called again.
     """
     if context.on_event is None or not is_users(function):
         return called_once(owner, function, call, context, *more)
-    if only_acts(function):
+    if starts_nothing(function):
         return None
     if _at_shutdown(context):
         _report_unforeseeable(owner, function, context)
         return None
-    result = called_once(owner, function, call, context, *more)
-    if result is None or result == []:
-        _report_called_again(owner, function, context)
-    return result
+    _report_called_again(owner, function, context)
+    return call()
 
 
 def once(method: Callable[..., T]) -> Callable[..., T]:
@@ -112,50 +111,26 @@ def _inner(function: Any) -> Any:
 _CHANGES = frozenset(
     (
         *("cancel", "emit_event", "emit_event_sync", "register_event_handler", "unregister_event_handler"),
-        *("execute", "visit", "extend_globals", "extend_locals"),
-        *("add", "append", "clear", "extend", "insert", "pop", "putenv", "remove", "setdefault", "update"),
+        *("execute", "visit", "extend_globals", "extend_locals", "launch_configurations"),
     )
 )
-"""Methods by which a function changes the launch, or a list or dictionary that another function may look at."""
-_STORES = frozenset(("STORE_SUBSCR", "DELETE_SUBSCR", "STORE_ATTR", "STORE_GLOBAL", "STORE_DEREF"))
+"""What a function uses of launch to change what follows."""
 
 
-def only_acts(function: object) -> bool:
-    """Return True if ``function``, by its code, returns nothing and changes nothing that the launch may see.
-
-    A plan learns nothing from it; it is called when its event happens.
-    """
+def starts_nothing(function: object) -> bool:
+    """Return True if the source of ``function`` is in reach, returns no value and changes nothing of the launch."""
     inner = _inner(function)
-    code = getattr(getattr(inner, "__func__", inner), "__code__", None)
-    return isinstance(code, CodeType) and _gives_nothing(code) and not _changes(code)
-
-
-def _gives_nothing(code: CodeType) -> bool:
-    if code.co_flags & (inspect.CO_GENERATOR | inspect.CO_COROUTINE | inspect.CO_ASYNC_GENERATOR):
+    try:
+        source = inspect.getsource(getattr(inner, "__func__", inner))
+        definition = ast.parse(textwrap.dedent(source)).body[0]
+    except (OSError, TypeError, SyntaxError):  # a lambda in the middle of an expression, a function of C
         return False
-    before: dis.Instruction | None = None
-    for instruction in dis.get_instructions(code):
-        if instruction.opname == "RETURN_CONST" and instruction.argval is not None:
-            return False
-        if instruction.opname == "RETURN_VALUE" and (instruction.is_jump_target or not _loads_none(before)):
-            return False
-        before = instruction
-    return True
+    return isinstance(definition, ast.FunctionDef) and not any(map(_matters, ast.walk(definition)))
 
 
-def _loads_none(instruction: Any) -> bool:
-    return instruction is not None and instruction.opname == "LOAD_CONST" and instruction.argval is None
-
-
-def _changes(code: CodeType) -> bool:
-    return any(
-        set(each.co_names) & _CHANGES or any(step.opname in _STORES for step in dis.get_instructions(each))
-        for each in _with_inner(code)
-    )
-
-
-def _with_inner(code: CodeType) -> Iterable[CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _with_inner(constant)
+def _matters(node: ast.AST) -> bool:
+    if isinstance(node, ast.Return):
+        return node.value is not None
+    if isinstance(node, ast.Attribute):
+        return node.attr in _CHANGES
+    return isinstance(node, (ast.Yield, ast.YieldFrom))

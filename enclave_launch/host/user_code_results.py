@@ -7,9 +7,8 @@ The first visit of the file records what each piece of user code returned and ch
   what it changed of the context and the environment is changed again;
 - ``$(command)``, ``$(eval)`` and random names are computed once.
 
-The result of a function that an event or a timer calls is replayed only if there is one and all that the function read
-is unchanged (``observed_state``); one that itself started something runs again. Used once: a further run evaluates
-again.
+What an event or a timer calls is not recorded: it is called again at its event. A function that itself started
+something runs again, too. Used once: a further run evaluates again.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.substitution import Substitution
 from enclave_launch.host.environment import changed, environment_snapshot
-from enclave_launch.host.observed_state import ObservedState, observing
 
 if TYPE_CHECKING:
     import logging
@@ -39,7 +37,7 @@ _OURS = "enclave_launch."
 class RecordedResult(NamedTuple):
     """The result of one call, or what it raised, and what it changed.
 
-    ``call_again``: it cannot stand for another call. ``depends_on``: it can while that state is unchanged.
+    ``call_again``: it cannot stand for another call.
     """
 
     value: Any = None
@@ -47,7 +45,6 @@ class RecordedResult(NamedTuple):
     effects: Effects | None = None
     call_again: bool = False
     logged: tuple[logging.LogRecord, ...] = ()
-    depends_on: ObservedState | None = None
 
     def get(self) -> Any:
         """Return the value, or raise what the call raised."""
@@ -57,10 +54,6 @@ class RecordedResult(NamedTuple):
 
 
 _CALL_AGAIN = RecordedResult(call_again=True)
-
-
-def _anything(result: Any) -> bool:
-    return result is not None and result != []
 
 
 class RecordedResults:
@@ -85,28 +78,16 @@ class RecordedResults:
         self._replaying = True
         return True
 
-    def call(
-        self,
-        key: Hashable,
-        function: Callable[[], T],
-        context: LaunchContext | None = None,
-        *,
-        at_event: bool = False,
-        worth: Callable[[T], bool] = _anything,
-    ) -> T:
+    def call(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None = None) -> T:
         """Call ``function``, or return what it returned when it was called with ``key`` before.
 
-        ``context`` is what it may change; ``worth`` decides whether an event's result is recorded at all.
+        ``context`` is what it may change.
         """
         if self._inside:
             return function()
         if self._replaying:
             return self._replay(key, function, context)
-        value: T = (
-            self._record_at_event(key, function, context, worth)
-            if at_event
-            else self._record(key, function, context)
-        )
+        value: T = self._record(key, function, context)
         return value
 
     def keep(self, *objects: object) -> tuple[int, ...]:
@@ -143,20 +124,6 @@ class RecordedResults:
         self._add(key, result)
         return result.get()
 
-    def _record_at_event(
-        self,
-        key: Hashable,
-        function: Callable[[], Any],
-        context: LaunchContext | None,
-        worth: Callable[[Any], bool],
-    ) -> Any:
-        with observing(context) as observation:
-            result = self._observed(function, context)
-        state = observation.state(context)
-        reusable = state is not None and result.error is None and worth(_fresh(result.value))
-        self._add(key, result._replace(depends_on=state) if reusable else _CALL_AGAIN)
-        return result.get()
-
     def _observed(self, function: Callable[[], Any], context: LaunchContext | None) -> RecordedResult:
         before = _Before(context)
         self._logged = []
@@ -178,8 +145,6 @@ class RecordedResults:
         recorded = self._recorded.get(key)
         result = recorded.popleft() if recorded else None
         if result is None or result.call_again:
-            return function()
-        if result.depends_on is not None and not result.depends_on.is_unchanged(context):
             return function()
         if result.effects is not None:
             result.effects.apply(context)

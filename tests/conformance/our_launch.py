@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from enclave_launch.diagnostics import Code
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate, parse_arguments
 from enclave_launch.frontend.error_location import likeliest
 from enclave_launch.host.plan_host import PlanHost
@@ -35,7 +36,12 @@ def run(case: Case, distro: str, folder: Path, prefix: Path, *, with_supposition
             evaluation = failure.partial
             shown = likeliest(failure.cause) if failure.cause is not None else failure
             error = (type(shown).__name__, str(shown))
-    logs += [("WARNING", warning.text) for warning in evaluation.warnings]
+    # That a plan calls code of events ahead of them is no log of the launch.
+    logs += [
+        ("WARNING", warning.text)
+        for warning in evaluation.warnings
+        if warning.code is not Code.FUNCTION_CALLED_AGAIN
+    ]
     folders = {str(folder): "DIR", str(prefix): "PREFIX"}
     return render(_outcome(evaluation, host, logs, error, folders, with_suppositions))
 

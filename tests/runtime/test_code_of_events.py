@@ -1,7 +1,4 @@
-"""Code that an event or a timer calls: once for plan and start together, unless it asks about the moment of its event.
-
-Each class of such code stands beside a neighbour that must be called at its event.
-"""
+"""Code that an event or a timer calls: for the plan if it may start something, and at its event in any case."""
 
 from __future__ import annotations
 
@@ -9,8 +6,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-
-import pytest
 
 HEAD = """
 import os
@@ -114,20 +109,35 @@ def generate_launch_description():
 """
 
 
-@pytest.mark.parametrize("with_security", [False, True], ids=["plain", "secured"])
-def test_each_class_of_code_is_called_once(tmp_path: Path, with_security: bool) -> None:
-    _, counts = launch(tmp_path, EVERY_CLASS, "-a", *(secured(tmp_path) if with_security else ()))
-    kinds = "function with entities", "function without entities", "substitution", "action", "command"
-    events = {f"{event} {kind}" for event in ("timer", "exit", "start") for kind in kinds}
-    others = {"completed callback", "shutdown callback", "shutdown function without entities"}
-    assert counts == dict.fromkeys(events | others, 1)
+KINDS = "function with entities", "function without entities", "substitution", "action", "command"
+EVENTS = {f"{event} {kind}" for event in ("timer", "exit", "start") for kind in KINDS}
+COMPLETED = "completed callback"
+AT_THE_END = {"shutdown callback", "shutdown function without entities"}
 
 
-def test_what_only_acts_and_what_a_shutdown_calls_is_not_called_by_a_dry_run(tmp_path: Path) -> None:
-    said, counts = launch(tmp_path, EVERY_CLASS, "--dry-run")
-    assert not [label for label in counts if "without" in label or "shutdown" in label or "action" in label]
+def starts_nothing(label: str) -> bool:
+    return "without" in label or "action" in label
+
+
+def test_a_plain_launch_calls_each_class_of_code_once(tmp_path: Path) -> None:
+    _, counts = launch(tmp_path, EVERY_CLASS, "-a")
+    assert counts == dict.fromkeys(EVENTS | AT_THE_END | {COMPLETED}, 1)
+
+
+def test_a_secured_launch_calls_it_for_the_plan_too_if_it_may_start_something(tmp_path: Path) -> None:
+    said, counts = launch(tmp_path, EVERY_CLASS, "-a", *secured(tmp_path))
+    assert counts == {
+        **{label: 1 if starts_nothing(label) else 2 for label in EVENTS | {COMPLETED}},
+        **dict.fromkeys(AT_THE_END, 1),
+    }
+    assert "gives.function is called for the plan, to know what it starts, and again at timer" in said
+    assert "acts.function is called" not in said
+
+
+def test_what_starts_nothing_and_what_a_shutdown_calls_is_not_called_by_a_dry_run(tmp_path: Path) -> None:
+    _, counts = launch(tmp_path, EVERY_CLASS, "--dry-run")
+    assert not [label for label in counts if starts_nothing(label) or "shutdown" in label]
     assert counts["exit function with entities"] == 1, "what it starts must be in the plan"
-    assert "function-called-again" not in said and "is called for the plan" not in said
 
 
 ASKS = """
@@ -166,7 +176,7 @@ def test_what_a_process_left_is_asked_for_when_it_has_ended(tmp_path: Path) -> N
     assert "function fresh" in said and "command fresh" in said
     assert "stale" not in said
     assert "ended 0" in said
-    assert counts == {"reads": 2, "exists": 1, "event": 2, "untouched": 1}
+    assert counts == dict.fromkeys(("reads", "exists", "event", "untouched"), 2)
 
 
 CHANGED = """
@@ -209,7 +219,7 @@ def generate_launch_description():
 """
 
 
-def test_what_was_called_for_the_plan_in_vain_is_told_and_called_again(tmp_path: Path) -> None:
+def test_what_started_nothing_for_the_plan_is_called_at_its_event(tmp_path: Path) -> None:
     told = "perhaps is called for the plan, to know what it starts, and again at OnProcessExit sh-1"
     said, counts = launch(tmp_path, IN_VAIN, "--dry-run")
     assert told in said and counts == {"perhaps": 1}
@@ -218,18 +228,21 @@ def test_what_was_called_for_the_plan_in_vain_is_told_and_called_again(tmp_path:
     assert counts == {"perhaps": 2}
 
 
-def test_a_folder_that_a_timer_makes_with_its_process_is_made_once(tmp_path: Path) -> None:
+def test_a_folder_that_a_timer_makes_is_made_for_the_plan_and_again(tmp_path: Path) -> None:
     text = """
 def function(context):
-    os.mkdir(os.path.join(HERE, "by_a_timer"))  # fails the second time
+    os.makedirs(os.path.join(HERE, "by_a_timer"), exist_ok=EXIST_OK)
     return [echo("made")]
 
 
 def generate_launch_description():
     return LaunchDescription([TimerAction(period=0.1, actions=[OpaqueFunction(function=function)])])
 """
-    said, _ = launch(tmp_path, text, *secured(tmp_path))
+    said, _ = launch(tmp_path, text.replace("EXIST_OK", "True"), *secured(tmp_path))
     assert "[echo-1] made" in said
+    (tmp_path / "by_a_timer").rmdir()
+    said, _ = launch(tmp_path, text.replace("EXIST_OK", "False"), *secured(tmp_path), expected=1)
+    assert "File exists" in said and "is called for the plan" in said
 
 
 AGAIN = """
@@ -246,7 +259,7 @@ def generate_launch_description():
 """
 
 
-def test_what_was_given_is_taken_for_the_first_event_only(tmp_path: Path) -> None:
-    """Each of the three exits starts a process of its own, as launch has it."""
+def test_each_event_calls_its_function(tmp_path: Path) -> None:
+    """Each of the three exits starts a process of its own, as in launch; the plan calls the function once more."""
     said, counts = launch(tmp_path, AGAIN, *secured(tmp_path))
-    assert said.count("] ended") == counts["function"] == 3
+    assert said.count("] ended") == 3 and counts["function"] == 4

@@ -124,13 +124,9 @@ class PythonExpression(Substitution):
         # A launch file may compute anything here: that is the substitution's purpose.
         expression = perform_substitutions(context, self.__expression)
         results = context.host.user_code_results
-        if results is None:
+        if results is None or context.on_event is not None:
             return str(eval(expression, {}, names))
-        return results.call(
-            ("eval", expression),
-            lambda: str(eval(expression, {}, names)),
-            at_event=context.on_event is not None,
-        )
+        return results.call(("eval", expression), lambda: str(eval(expression, {}, names)))
 
 
 def _literal_names(modules: Any) -> list[str]:
