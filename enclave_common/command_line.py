@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -33,7 +33,10 @@ def given_path(text: str) -> Path:
     """Return ``text`` as a path; raises argparse.ArgumentTypeError if it is empty, as an unset variable."""
     if not text:
         raise argparse.ArgumentTypeError("an empty path; is a variable of the shell not set?")
-    return Path(text)
+    try:
+        return Path(text).expanduser()  # bash leaves the ~ of --option=~/folder as it is
+    except RuntimeError:
+        raise argparse.ArgumentTypeError(f"{text!r}: there is no such user") from None
 
 
 def time_span(text: str) -> float:
@@ -55,6 +58,27 @@ TEXTS: Kind = {"action": "append", "default": []}
 PATHS: Kind = {**TEXTS, **PATH}
 
 
+@dataclass(frozen=True)
+class FromProject:
+    """What gives the value of an option that was not written (``enclave_common/project.py``).
+
+    Attributes:
+        key: A key of ``enclaves.yaml``.
+        if_exists: A path that does not exist counts as not given, where the command only reads it.
+        unless: Another option (``dest``) beside which the value is not taken.
+        beside: Another option (``dest``) without which the value is not taken.
+    """
+
+    key: str
+    if_exists: bool = False
+    unless: str = ""
+    beside: str = ""
+
+    def applies(self, given: Collection[str]) -> bool:
+        """Return whether the value is taken, by the names of the options that were written."""
+        return self.unless not in given and (not self.beside or self.beside in given)
+
+
 def one_of(*choices: str) -> Kind:
     """Return the kind of an option with choices; the first is the default."""
     return {"choices": choices, "default": choices[0]}
@@ -70,18 +94,22 @@ class OptionGroup(Protocol):
         """Add a group of options of which one at most may be given, as ``argparse`` does."""
 
 
+_NOTES = ("completer", "configured")
+"""What a kind holds beside argparse's words: argcomplete's attribute, and ``FromProject``."""
+
+
 def add_options(group: OptionGroup, options: Iterable[Option]) -> list[argparse.Action]:
-    """Add each to a parser or group, with what completes it in a shell (``completer``); return argparse's actions."""
+    """Add each to a parser or group; return argparse's actions, with what is in a kind beside argparse's words."""
     added = []
     for written, kind, text in options:
         words = written.split()
         flags = [word for word in words if word.startswith("-")] or words[:1]
         metavar = {"metavar": words[-1]} if len(words) > len(flags) else {}
         settings = {**metavar, **kind, "help": text}
-        completer = settings.pop("completer", None)
+        notes = {name: settings.pop(name) for name in _NOTES if name in settings}
         action = group.add_argument(*flags, **settings)
-        if completer is not None:
-            setattr(action, "completer", completer)  # noqa: B010  # argcomplete's own attribute
+        for name, note in notes.items():
+            setattr(action, name, note)
         added.append(action)
     return added
 
@@ -107,6 +135,7 @@ class CommandParser(argparse.ArgumentParser):
         self.arguments: list[argparse.Action] = []
         self.verbs: dict[str, CommandParser] = {}
         self._is_verb = False
+        self.verb_dest = ""
         texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
         form = {"allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter}
         super().__init__(**{**form, **settings, **texts})
@@ -120,10 +149,11 @@ class CommandParser(argparse.ArgumentParser):
         group = self.add_argument_group(title) if title else self
         self.arguments += add_options(group.add_mutually_exclusive_group(), options)
 
-    def add_verbs(self, **settings: Any) -> None:
-        """Prepare for ``add_verb``."""
+    def add_verbs(self, dest: str = "verb") -> None:
+        """Prepare for ``add_verb``; the parsed value ``dest`` names the verb."""
+        self.verb_dest = dest
         self._add_parser = self.add_subparsers(
-            title="verbs", metavar="VERB", required=True, **settings
+            title="verbs", metavar="VERB", required=True, dest=dest
         ).add_parser
 
     def add_verb(self, name: str, docstring: str | None, **settings: Any) -> CommandParser:
@@ -337,17 +367,40 @@ class CommandLine:
     Attributes:
         options: Every option with its value.
         given: The names of the options that were written.
+        actions: The options of the command or verb.
     """
 
     options: argparse.Namespace
     given: frozenset[str]
+    actions: tuple[argparse.Action, ...] = ()
 
 
 def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> CommandLine:
-    """Parse as ``parse_intermixed_args`` does, separating given values from defaults."""
-    defaults = {action.dest: action.default for action in parser.arguments}
+    """Parse a command line. Options and words may stand in any order behind the verb.
+
+    Args:
+        parser: The parser of the command. It is used up: its defaults are changed.
+        argv: The words, by default those of this process.
+
+    Returns:
+        Every option, and the names of those that were written.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    chosen = {}
+    while parser.verb_dest:
+        if not words or words[0] not in parser.verbs:
+            return CommandLine(parser.parse_args(words), frozenset())  # or ends: help, a version, an error
+        chosen[parser.verb_dest] = words[0]
+        parser, words = parser.verbs[words[0]], words[1:]
+    defaults = {action.dest: _default(action) for action in parser.arguments}
     for action in parser.arguments:
-        action.default = argparse.SUPPRESS
-    given = vars(parser.parse_intermixed_args(argv))
+        if action.nargs != "?":  # argparse would convert the mark as a value
+            action.default = argparse.SUPPRESS
+    given = vars(parser.parse_intermixed_args(words))
     known = {name: value for name, value in defaults.items() if value is not argparse.SUPPRESS}
-    return CommandLine(argparse.Namespace(**{**known, **given}), frozenset(given))
+    written = frozenset(name for name, value in given.items() if name in defaults and value is not None)
+    return CommandLine(argparse.Namespace(**{**chosen, **known, **given}), written, tuple(parser.arguments))
+
+
+def _default(action: argparse.Action) -> Any:
+    return [] if action.nargs == "*" and action.default is None else action.default

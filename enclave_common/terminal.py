@@ -14,7 +14,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from os import PathLike
 from typing import Any, TextIO, cast
@@ -41,6 +41,12 @@ def warn(*texts: object) -> None:
     """Print each on stderr as a warning of ``secure-launch``."""
     for text in texts:
         print(f"secure-launch: warning: {message(text)}", file=sys.stderr)
+
+
+def print_notes(lines: Iterable[str]) -> None:
+    """Print each on stderr, for a person who wants to know more (``--verbose``)."""
+    for line in lines:
+        print(printable(line), file=sys.stderr)
 
 
 def quoted(text: str | PathLike[str]) -> str:

@@ -16,10 +16,10 @@ from typing import NamedTuple, Optional
 
 from pydantic import Field, StrictBool, StrictStr
 
+from enclave_common.strict_yaml import Strict, StrictDocument
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.bundle import refuse_host_name as refuse_host_name
-from keystore.formats.given_file import read_given
-from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
+from keystore.formats.given_file import parse_given, read_given
 
 _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
 _DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")
@@ -116,7 +116,7 @@ def load_hosts(path: Path) -> Hosts:
 
 def parse_hosts(text: bytes, where: str) -> Hosts:
     """Return what ``load_hosts`` returns, from the file's content."""
-    document = parse_strict(_Document, text, where)
+    document = parse_given(_Document, text, where)
     for name in document.hosts:
         refuse_host_name(name, where)
     for needs in document.needs:

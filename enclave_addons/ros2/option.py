@@ -22,6 +22,7 @@ from ros2launch.option import OptionExtension
 
 from enclave_addons.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_common.command_line import CommandLine, add_options
+from enclave_common.project import ProjectError, find_project, with_project
 from enclave_common.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 
@@ -66,12 +67,14 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
             looking = check_views(CommandLine(options, frozenset(given)), self._ours)
             if not keystore:
                 check_needs_secure(self._ours, given & (FOR_SECURE if looking else FOR_SECURE | FOR_PLAN))
+            if not looking and not keystore:
+                return (launch_description,)
+            line = CommandLine(options, frozenset(given), tuple(self._ours))
+            options = with_project(line, find_project(Path(target_of(options)[0]).parent, Path()))
             if looking:
                 raise SystemExit(_shown(options))
-            if not keystore:
-                return (launch_description,)
             raise SystemExit(_launched(launch_description, options))
-        except EnclaveLaunchError as error:
+        except (EnclaveLaunchError, ProjectError) as error:
             raise RuntimeError(str(error)) from error
 
 

@@ -6,7 +6,6 @@ import argparse
 import os
 import re
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 
 from enclave_common.command_line import (
     FLAG,
@@ -15,6 +14,7 @@ from enclave_common.command_line import (
     TEXT,
     TEXTS,
     CommandParser,
+    FromProject,
     Option,
     OptionGroup,
     add_options,
@@ -56,7 +56,8 @@ def names_of(options: Iterable[Option]) -> frozenset[str]:
 
 SECURITY: tuple[Option, ...] = (
     ("--secure", FLAG, "give every process its enclave; refuse to start otherwise"),
-    ("--keystore DIR", PATH, "keystore to use (default: ROS_SECURITY_KEYSTORE); created when it does not exist"),
+    ("--keystore DIR", {**PATH, "configured": FromProject("keystore")},
+     "keystore to use (default: ROS_SECURITY_KEYSTORE, or keystore in enclaves.yaml); created when it does not exist"),
     ("--provision-only", FLAG, "make keys, certificates and permissions as planned; start nothing"),
     ("--no-create-keystore", FLAG, "an absent keystore is an error"),
     ("--strategy", one_of("Enforce", "Permissive"), "ROS_SECURITY_STRATEGY of the processes (default: Enforce)"),
@@ -77,18 +78,19 @@ LATE: tuple[Option, ...] = (
     ("--allow-late", FLAG, "provision actions that only exist at run time instead of refusing them"),
 )
 POLICY: tuple[Option, ...] = (
-    ("--nodl FILE|DIR", PATHS,
+    ("--nodl FILE|DIR", {**PATHS, "configured": FromProject("nodl")},
      "use this NoDL manifest, or those of a folder, if definitions conflict (repeatable)"),
     ("--missing-nodl", one_of("infer", "analysis", "library", "error"),
      "nodes without a manifest: infer from their source, else take the library (default), only one of the two, "
      "or an error"),
-    ("--library DIR", PATHS,
+    ("--library DIR", {**PATHS, "configured": FromProject("library")},
      "documents of your own that add to or correct the library (repeatable; docs/library.md)"),
-    ("--source DIR", PATHS,
+    ("--source DIR", {**PATHS, "configured": FromProject("source")},
      "look for the sources of compiled nodes below this folder too (repeatable; docs/inference.md)"),
     ("--accept-patterns", FLAG,
      "accept names of which inference knows only a part, as wildcards; each is reported"),
-    ("--enclave-scope", one_of("namespace", "node", "process", "launch"),
+    ("--enclave-scope",
+     {**one_of("namespace", "node", "process", "launch"), "configured": FromProject("enclave-scope")},
      "which processes share an enclave (default: those of a namespace)"),
     ("--also WHAT", {**TEXTS, "choices": tuple(ALSO)},
      "grant every node also: clock (use_sim_time set at run time), logger-services, service-events "
@@ -129,7 +131,7 @@ def distribution(text: str) -> str:
 
 EVALUATION: tuple[Option, ...] = (
     ("--prefix DIR", PATHS, "ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)"),
-    ("--distro NAME[@DATE]", {"type": distribution},
+    ("--distro NAME[@DATE]", {"type": distribution, "configured": FromProject("distro")},
      f"ROS distribution to behave like: {', '.join(distro.value for distro in Distro)} (default: ROS_DISTRO, else "
      f"{DEFAULT.value}). Installed packages decide the version, else the newest known patch release, or that of the "
      "date, as in jazzy@2025-03"),
@@ -192,13 +194,8 @@ def build_parser() -> CommandParser:
 
 def add_security_options(group: OptionGroup) -> list[argparse.Action]:
     """Add options that are also those of ``ros2 launch``, see ``ros2.option``."""
-    secure = add_options(group, SECURITY)
-    keystore = os.environ.get("ROS_SECURITY_KEYSTORE")
-    for action in secure:
-        if action.dest == "keystore" and keystore:
-            action.default = Path(keystore)
     return [
-        *secure,
+        *add_options(group, SECURITY),
         *add_options(group.add_mutually_exclusive_group(), PASSPHRASE),
         *add_options(group, LATE),
     ]

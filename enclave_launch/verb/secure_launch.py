@@ -6,15 +6,17 @@ import argparse
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 from enclave_common.command_line import (
     CommandLine,
-    CommandParser,
     complete,
     guarded,
     read_command_line,
 )
+from enclave_common.project import ProjectError, described, find_project, with_project
 from enclave_common.terminal import (
+    print_notes,
     printable,
     printable_lines,
     safe_output,
@@ -41,7 +43,7 @@ from enclave_launch.security_environment import SecuritySettings
 from enclave_launch.verb.modes import check_modes
 from enclave_launch.verb.options import build_parser, resolve_options
 from enclave_launch.verb.planning import planned
-from enclave_launch.verb.target import LaunchTarget, find_target
+from enclave_launch.verb.target import LaunchTarget, find_target, launch_folder
 from enclave_launch.verb.usage import (
     FOR_PLAN,
     FOR_SECURE,
@@ -59,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser = build_parser()
         complete(parser)
         line = read_command_line(parser, argv)
-        return guarded("secure-launch", lambda: _main(line, parser), EnclaveLaunchError)
+        return guarded("secure-launch", lambda: _main(line), EnclaveLaunchError, ProjectError)
 
 
 def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None:
@@ -77,15 +79,18 @@ def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None
             check_needs_secure(actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
 
 
-def _main(line: CommandLine, parser: CommandParser) -> int:
-    check_options(line, parser.arguments)
-    options = line.options
+def _main(line: CommandLine) -> int:
+    check_options(line, line.actions)
+    prefixes = search_prefixes(line.options.prefix)
+    options = with_project(line, find_project(launch_folder(line.options.words, prefixes), Path()))
+    if options.verbose:
+        print_notes(described(options))
     for prefix in options.prefix:  # absent folders on AMENT_PREFIX_PATH are passed over, as by ament
         if not prefix.is_dir():
             raise UsageError(f"--prefix {prefix}: no such directory")
     if options.show_all_subprocesses_output:
         os.environ["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] = "both"  # as ros2 launch says it to launch
-    target = find_target(options.words, search_prefixes(options.prefix))
+    target = find_target(options.words, prefixes)
     if options.show_args or options.print_description:
         with ament_prefixes(options.prefix):
             return _show_file(target, options)
@@ -103,7 +108,9 @@ def _keystore(options: argparse.Namespace) -> str | None:
     if not options.secure:
         return None
     if options.keystore is None:
-        raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
+        raise UsageError(
+            "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE, or keystore in enclaves.yaml"
+        )
     return str(os.path.abspath(options.keystore))
 
 

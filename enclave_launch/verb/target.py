@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.words import did_you_mean
@@ -41,6 +42,18 @@ def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
         what = "is not a regular file" if os.path.exists(first) else "does not exist"
         raise UsageError(f"launch file {first!r} {what} (give PACKAGE LAUNCH_FILE or a PATH){_beside(first)}")
     return LaunchTarget(_in_package(first, rest[0], prefixes), parse_arguments(rest[1:]))
+
+
+def launch_folder(words: Sequence[str], prefixes: Sequence[str]) -> Path | None:
+    """Return the folder of the launch file that ``words`` name, None if they name none."""
+    if not words:
+        return None
+    if os.path.isfile(words[0]) or len(words) == 1 or ":=" in words[1]:
+        return Path(words[0]).parent if os.path.exists(words[0]) else None
+    try:
+        return Path(ament_index.launch_file_path(words[0], words[1], prefixes)).parent
+    except (LookupError, OSError, ValueError):
+        return None
 
 
 def _beside(path: str) -> str:

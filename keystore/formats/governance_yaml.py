@@ -10,11 +10,11 @@ from typing import Union
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
+from enclave_common.strict_yaml import Strict, StrictDocument
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
-from keystore.formats.given_file import read_given
+from keystore.formats.given_file import parse_given, read_given
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, read_foreign_governance
-from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
 
 class _Topic(Strict, frozen=True):
@@ -54,7 +54,7 @@ def governance_of(path: Path) -> Governance:
 
 def parse_governance_yaml(text: bytes, where: str) -> Governance:
     """Read ``governance.yaml``. Raises ``InvalidInputError``, which begins with ``where``."""
-    document = parse_strict(_Document, text, where)
+    document = parse_given(_Document, text, where)
     if not document.domain_rules:
         raise InvalidInputError(f"{where}: domain_rules: at least one rule is needed")
     try:

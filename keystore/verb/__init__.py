@@ -7,17 +7,23 @@ something ends soon and 4 something has ended (``status``); 75 the keystore is i
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from enclave_common.command_line import (
+    CommandLine,
     CommandParser,
     add_verbosity,
     add_version,
     complete,
     guarded,
+    read_command_line,
 )
-from enclave_common.terminal import safe_output
-from keystore.errors import KeystoreError
+from enclave_common.project import Project, ProjectError, described, find_project, with_project
+from enclave_common.terminal import print_notes, safe_output
+from keystore.errors import InvalidInputError, KeystoreError
 from keystore.verb.common import FOLDED, add_table
 
 VERBS = (
@@ -31,8 +37,43 @@ def main(argv: Sequence[str] | None = None) -> int:
     with safe_output():
         parser = build_parser()
         complete(parser)
-        arguments = parser.parse_args(argv)
-        return guarded("secure-keystore", lambda: int(arguments.run(arguments)), KeystoreError)
+        line = read_command_line(parser, argv)
+        return guarded("secure-keystore", lambda: _run(line), KeystoreError, ProjectError)
+
+
+def _run(line: CommandLine) -> int:
+    project = find_project(Path())
+    arguments = _with_keystore(line, project) if "keystore" in vars(line.options) else line.options
+    if getattr(arguments, "verbose", False):
+        print_notes(described(arguments))
+    return int(arguments.run(arguments))
+
+
+def _with_keystore(line: CommandLine, project: Project | None) -> argparse.Namespace:
+    """Return the options with the keystore that was named, or that the project names; raises InvalidInputError."""
+    arguments = with_project(line, project)
+    if _is_enclave(arguments.keystore) and "enclaves" in vars(arguments):
+        elsewhere = with_project(replace(line, given=line.given - {"keystore"}), project)
+        if elsewhere.keystore != arguments.keystore:
+            elsewhere.enclaves = [str(arguments.keystore), *arguments.enclaves]
+            return elsewhere
+    if arguments.keystore is None and not _is_optional(line):
+        raise InvalidInputError(
+            "which keystore? nothing names one\n"
+            f"try: secure-keystore {line.options.verb} ks, with the folder of your keystore for ks; or set "
+            "ROS_SECURITY_KEYSTORE, or write an enclaves.yaml (secure-plan init)"
+        )
+    return arguments
+
+
+def _is_enclave(word: Path | None) -> bool:
+    """Return whether the first word is an enclave rather than the folder of a keystore."""
+    return word is not None and word.is_absolute() and not word.exists()
+
+
+def _is_optional(line: CommandLine) -> bool:
+    """Return whether the verb has an option ``--keystore``, which may be absent."""
+    return any(action.dest == "keystore" and action.option_strings for action in line.actions)
 
 
 def build_parser() -> CommandParser:

@@ -8,7 +8,17 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_common.command_line import FLAG, PATH, TEXT, TIME, CommandParser, Kind, Option, one_of
+from enclave_common.command_line import (
+    FLAG,
+    PATH,
+    TEXT,
+    TIME,
+    CommandParser,
+    FromProject,
+    Kind,
+    Option,
+    one_of,
+)
 from enclave_common.terminal import counted_progress, json_text
 from enclave_common.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
@@ -34,7 +44,10 @@ class SecretOptions(NamedTuple):
 Table = tuple[Option | SecretOptions, ...]
 
 
-KEYSTORE: Option = ("keystore KEYSTORE", PATH, "root directory of the keystore")
+KEYSTORE: Option = (
+    "keystore KEYSTORE", {**PATH, "nargs": "?", "configured": FromProject("keystore")},
+    "root directory of the keystore (default: ROS_SECURITY_KEYSTORE, or keystore in enclaves.yaml)",
+)  # fmt: skip
 
 
 def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:

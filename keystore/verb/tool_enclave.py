@@ -15,7 +15,7 @@ from keystore.steps.tool_enclaves import create_tool_enclave
 from keystore.verb import common
 
 SETTINGS = {
-    "usage": "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]",
+    "usage": "secure-keystore tool-enclave [KEYSTORE] --for TOOL [TARGET ...] [options]",
     "epilog": "tools:\n"
     + "".join(f"  {f'{tool.name} {tool.target.value}':20}  {tool.what}\n" for tool in TABLE),
 }

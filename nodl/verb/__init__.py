@@ -14,15 +14,18 @@ from typing import NamedTuple
 
 from enclave_common.command_line import (
     TEXTS,
+    CommandLine,
     CommandParser,
     Option,
     add_verbosity,
     add_version,
     complete,
     guarded,
+    read_command_line,
 )
 from enclave_common.files import write_text
-from enclave_common.terminal import printable, safe_output
+from enclave_common.project import ProjectError, described, find_project, with_project
+from enclave_common.terminal import print_notes, printable, safe_output
 from nodl.errors import NoDLError
 
 VERBS = ("convert", "show", "validate")
@@ -45,11 +48,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     with safe_output():
         parser = build_parser()
         complete(parser)
-        arguments = parser.parse_args(argv)
-        return guarded(f"secure-nodl {arguments.verb}", lambda: _run(arguments), NoDLError)
+        line = read_command_line(parser, argv)
+        return guarded(f"secure-nodl {line.options.verb}", lambda: _run(line), NoDLError, ProjectError)
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _run(line: CommandLine) -> int:
+    arguments = with_project(line, find_project(Path()))
+    if getattr(arguments, "verbose", False):
+        print_notes(described(arguments))
     try:
         return int(arguments.run(arguments))
     except BrokenPipeError:

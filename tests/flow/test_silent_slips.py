@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_addons.review.verb.judging import read_expectations
+from enclave_addons.review.verb.judging import expectations
 from enclave_launch import ResolveOptions, UsageError, provision, resolve
 from keystore import create_tool_enclave
 from nodl.errors import NoManifestError
@@ -27,13 +27,15 @@ def test_a_folder_named_for_its_manifests_that_has_none(tmp_path: Path, secure_l
     assert secure_launch("--dry-run", "--nodl", DEMO, tmp_path / "a.launch.xml").returncode == 0
 
 
-def test_a_code_to_accept_that_no_finding_has() -> None:
-    accepted = {"code": "flow-forbidden", "why": "known"}
-    assert read_expectations({"accept": [accepted]}, "rules.yaml").accept
+def test_a_code_to_accept_that_no_finding_has(tmp_path: Path) -> None:
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("accept:\n- {code: flow-forbidden, why: known}\n")
+    assert expectations(rules).accept
+    rules.write_text("accept:\n- {code: flow-forbiden, why: known}\n")
     with pytest.raises(
         UsageError, match=r"no finding with the code 'flow-forbiden'; did you mean 'flow-forbidden'"
     ):
-        read_expectations({"accept": [accepted | {"code": "flow-forbiden"}]}, "rules.yaml")
+        expectations(rules)
 
 
 @pytest.mark.parametrize("given, is_told", [("robto", True), ("robot", False), ("use_sim_time", False)])

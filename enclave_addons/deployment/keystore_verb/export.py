@@ -22,7 +22,7 @@ from enclave_addons.deployment.host_bundles import (
 )
 from enclave_addons.deployment.hosts import load_hosts
 from enclave_addons.deployment.public_files import PublicFiles, export
-from enclave_common.command_line import FLAG, PATH, TEXTS, one_of
+from enclave_common.command_line import FLAG, PATH, TEXTS, FromProject, one_of
 from enclave_common.words import counted
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
@@ -36,7 +36,8 @@ OPTIONS: common.Table = (
     common.KEYSTORE,
     ("-o --output OUT", {**PATH, "required": True}, ""),
     ("--enclave PATTERN", TEXTS, "name or fnmatch pattern such as '/robot1/*'; repeatable"),
-    ("--hosts FILE", PATH, "YAML: which enclaves belong to which host"),
+    ("--hosts FILE", {**PATH, "configured": FromProject("hosts", unless="enclave")},
+     "YAML: which enclaves belong to which host"),
     ("--host NAME", TEXTS, "with --hosts only these; without, the one host that gets the enclaves of --enclave"),
     ("--public", one_of("link", "copy"),
      "link: public/ once and links to it (default); copy: each enclave directory stands alone"),

@@ -37,7 +37,7 @@ from enclave_addons.deployment.units import MARK
 from enclave_addons.review.document import plan_from_document
 from enclave_addons.review.information_flow import flow_graph
 from enclave_addons.review.verb.plans import read_plan
-from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS
+from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS, FromProject
 from enclave_common.terminal import message, printable
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.dry_run import DryRun
@@ -52,7 +52,8 @@ OPTIONS = {
     "": (
         ("--format", {"choices": ENGINES, "required": True}, "what runs the processes"),
         ("-o --output DIR", {**PATH, "required": True}, "where the files are written"),
-        ("--keystore DIR", {"required": True}, "where the plan is provisioned: what its enclaves hold"),
+        ("--keystore DIR", {"configured": FromProject("keystore")},
+         "where the plan is provisioned: what its enclaves hold"),
         HOSTS,
         ("--name", TEXT, "of target, project or namespace (default: ros- and the launch file's name)"),
         ("--accept-unexpressed", FLAG, "leave out what the engine cannot express"),
@@ -98,6 +99,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
+    if options.keystore is None:
+        raise UsageError("--keystore DIR is needed, or keystore in enclaves.yaml: what the enclaves hold")
     if options.format != "systemd" and not options.image:
         raise UsageError(f"--format {options.format} needs --image")
     if not _USER.fullmatch(options.user):

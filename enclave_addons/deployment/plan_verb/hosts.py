@@ -21,13 +21,17 @@ from enclave_addons.review.document import plan_from_document
 from enclave_addons.review.information_flow import FlowGraph, flow_graph
 from enclave_addons.review.review_text import step_text
 from enclave_addons.review.verb.plans import FORM, read_plan
-from enclave_common.command_line import PATH, Option
+from enclave_common.command_line import PATH, FromProject, Option
 from enclave_common.files import write_text
 from enclave_common.terminal import json_text
 from enclave_launch.errors import UsageError, translated
 from keystore.errors import InvalidInputError
 
-HOSTS: Option = ("--hosts FILE", PATH, "file that assigns nodes or enclaves to hosts")
+HOSTS: Option = (
+    "--hosts FILE",
+    {**PATH, "configured": FromProject("hosts")},
+    "file that assigns nodes or enclaves to hosts",
+)
 OPTIONS = {
     "": (
         HOSTS,

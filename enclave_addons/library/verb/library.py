@@ -8,13 +8,17 @@ from collections.abc import Iterable, Iterator
 
 from enclave_addons.library import Hit, Library
 from enclave_addons.library.document import LibraryDocument
-from enclave_common.command_line import TEXT, TEXTS, Option
+from enclave_common.command_line import TEXT, TEXTS, FromProject, Option
 from enclave_common.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.verb import PREFIX, Verb
 from nodl.verb.show import description_lines
 
-LIBRARY: Option = ("--library DIR", TEXTS, "documents of your own, which come first")
+LIBRARY: Option = (
+    "--library DIR",
+    {**TEXTS, "configured": FromProject("library")},
+    "documents of your own, which come first",
+)
 LIST: tuple[Option, ...] = (("packages PACKAGE", {"nargs": "*"}, "only these"), LIBRARY)
 PROGRAM: tuple[Option, ...] = (
     ("package PACKAGE", TEXT, "its package"),

@@ -37,7 +37,7 @@ from enclave_addons.observation.graph.observing import (
     observer,
 )
 from enclave_addons.review.verb.plans import FORM, read_plan, read_saved
-from enclave_common.command_line import PATH, PATHS, TEXT, TEXTS, TIME, one_of
+from enclave_common.command_line import PATH, PATHS, TEXT, TEXTS, TIME, FromProject, one_of
 from enclave_common.environment import environment_with
 from enclave_common.terminal import json_text, message
 from enclave_launch.admission.variables import domain_of
@@ -61,7 +61,7 @@ class CannotObserve(EnclaveLaunchError):
 OPTIONS = {
     "what to observe": (
         ("--domain-id N", {"type": int}, "default: the domain that the plan is for"),
-        ("--keystore DIR", PATH, "of a secured system"),
+        ("--keystore DIR", {**PATH, "configured": FromProject("keystore", beside="enclave")}, "of a secured system"),
         ("--enclave NAME", TEXT, "the observer's own"),
         ("--for TIME", {**TIME, "dest": "longest", "default": 30.0}, "how long to wait for planned nodes (30s)"),
         ("--settle TIME", {**TIME, "default": 5.0}, "compare when nothing changed for this time (5s)"),

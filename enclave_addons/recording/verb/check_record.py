@@ -22,7 +22,7 @@ from enclave_addons.library.apply import applied, own_name
 from enclave_addons.recording.record.assembly import read_record
 from enclave_addons.recording.record.checking import Comparison, Verdict, compare
 from enclave_addons.recording.record.requested import RequestedNode, all_requested
-from enclave_common.command_line import PATH, PATHS, Option, one_of
+from enclave_common.command_line import PATH, PATHS, FromProject, Option, one_of
 from nodl.ament_index import search_prefixes
 from nodl.dependence import Situation
 from nodl.lookup import ManifestLookup
@@ -36,10 +36,10 @@ JUDGED = ("manifest", "inference", "library")
 
 OPTIONS: tuple[Option, ...] = (
     ("records RECORD", {**PATH, "nargs": "+"}, "files *.record, or folders"),
-    ("--nodl FILE|DIR", PATHS, "manifests to judge"),
+    ("--nodl FILE|DIR", {**PATHS, "configured": FromProject("nodl")}, "manifests to judge"),
     ("--judge", {"choices": (*JUDGED, "all"), "default": "all"},
      "what to compare: manifests, inference from source, the library, or all that describe the node"),
-    ("--source DIR", PATHS,
+    ("--source DIR", {**PATHS, "configured": FromProject("source")},
      "sources of compiled nodes, for inference (repeatable; default: the workspaces of the prefixes)"),
     ("--format", one_of("text", "json"), "how to print (text)"),
     PREFIX,

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from enclave_addons.review.verb.plans import WORDS
 from enclave_common.command_line import (
+    CommandLine,
     CommandParser,
     Option,
     add_verbosity,
     add_version,
     complete,
     guarded,
+    read_command_line,
 )
-from enclave_common.terminal import safe_output
+from enclave_common.project import ProjectError, described, find_project, with_project
+from enclave_common.terminal import print_notes, safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.options import EVALUATION, POLICY
+from enclave_launch.verb.target import launch_folder
+from nodl.ament_index import search_prefixes
 
 PLAN: tuple[Option, ...] = (("words", WORDS, "a plan or what to plan"),)
 RESOLVING = (*POLICY, *EVALUATION)
 """As of ``secure-launch``; a saved plan takes none."""
-VERBS = ("show", "check", "diff", "flow", "suggest", "report", "evidence")
+VERBS = ("init", "doctor", "show", "check", "diff", "flow", "suggest", "report", "evidence")
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
 revisions, ask which enclave can influence which, place it on hosts, export it to systemd, Compose or Kubernetes.
@@ -38,10 +44,11 @@ def build_parser() -> CommandParser:
         verb.add_options(getattr(module, "WORDS", PLAN))
         for title, options in module.OPTIONS.items():
             verb.add_options(options, title)
-        verb.add_options(RESOLVING)
-        verb.fold(RESOLVING, "secure-launch --help")
-        # A launch prefix is only of use where something is started.
-        verb.set_defaults(launch_prefix=None, launch_prefix_filter=None)
+        if getattr(module, "PLANS", True):
+            verb.add_options(RESOLVING)
+            verb.fold(RESOLVING, "secure-launch --help")
+            # A launch prefix is only of use where something is started.
+            verb.set_defaults(launch_prefix=None, launch_prefix_filter=None)
     add_verbosity(parser)
     return parser
 
@@ -51,5 +58,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     with safe_output():
         parser = build_parser()
         complete(parser)
-        options = parser.parse_args(argv)
-        return guarded("secure-plan", lambda: int(options.run(options)), EnclaveLaunchError)
+        line = read_command_line(parser, argv)
+        return guarded("secure-plan", lambda: _run(line), EnclaveLaunchError, ProjectError)
+
+
+def _run(line: CommandLine) -> int:
+    words = getattr(line.options, "words", [])
+    prefixes = search_prefixes(getattr(line.options, "prefix", []))
+    options = with_project(line, find_project(launch_folder(words, prefixes), Path()))
+    if getattr(options, "verbose", False):
+        print_notes(described(options))
+    return int(options.run(options))

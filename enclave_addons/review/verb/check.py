@@ -17,7 +17,7 @@ from enclave_addons.review.review_text import findings_document, findings_text
 from enclave_addons.review.sarif import sarif_document
 from enclave_addons.review.verb.judging import EXPECT, WITHIN, judged
 from enclave_addons.review.verb.plans import planned_file, read_plan
-from enclave_common.command_line import FLAG, PATH, one_of
+from enclave_common.command_line import FLAG, PATH, FromProject, one_of
 from enclave_common.terminal import json_text
 from enclave_launch import __version__
 from enclave_launch.dry_run import Diagnostic, DryRun
@@ -26,7 +26,11 @@ OPTIONS = {
     "": (
         ("--format", one_of("text", "json", "sarif"), "how to print (text)"),
         ("--strict", FLAG, "warnings count as errors"),
-        ("--keystore DIR", PATH, "compare the plan with it; it is only read"),
+        (
+            "--keystore DIR",
+            {**PATH, "configured": FromProject("keystore", if_exists=True)},
+            "compare the plan with it; it is only read",
+        ),
         WITHIN,
         EXPECT,
     )
@@ -36,7 +40,7 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
     plan = read_plan(options.words, options)
-    found = judged(plan, options.expect, options.keystore, options.within)
+    found = judged(plan, options.expect, options.keystore, options.within, project=options.project)
     sys.stdout.write(_text(plan, found, options))
     open_ones = [finding for finding, accepted in found if accepted is None]
     return 1 if any(options.strict or finding.severity == "error" for finding in open_ones) else 0

@@ -25,7 +25,7 @@ from enclave_addons.review.evidence.documents import PAYLOAD_TYPE, Examined, evi
 from enclave_addons.review.verb.judging import EXPECT, WITHIN, judged
 from enclave_addons.review.verb.keystores import endings
 from enclave_addons.review.verb.plans import is_saved_plan, planned_file, read_document
-from enclave_common.command_line import PATH, TEXT
+from enclave_common.command_line import PATH, TEXT, FromProject
 from enclave_common.files import read_bytes, write_bytes
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, keystore_errors, translated
@@ -44,7 +44,11 @@ SIGNED = "statement.dsse.json"
 OPTIONS = {
     "": (
         ("-o --output DIR", {**PATH, "required": True}, "a new or empty folder"),
-        ("--keystore DIR", PATH, "look at its keys, governance and files"),
+        (
+            "--keystore DIR",
+            {**PATH, "configured": FromProject("keystore", if_exists=True)},
+            "look at its keys, governance and files",
+        ),
         ("--sbom FILE", PATH, "the product's CycloneDX document (JSON)"),
         ("--sign-key FILE", PATH, "sign the statement with this EC or RSA key"),
         ("--passphrase-env NAME", TEXT, "the variable with the key's passphrase"),
@@ -89,7 +93,7 @@ def _examine(options: argparse.Namespace) -> Examined:
     document = read_document(options.words, options)
     plan = DryRun(**document)
     components = _bill_of_materials(options.sbom) if options.sbom is not None else None
-    found = judged(plan, options.expect, keystore, options.within, now)
+    found = judged(plan, options.expect, keystore, options.within, now, options.project)
     ends = endings(keystore, now=now) if keystore is not None else None
     root = os.getcwd()
     contents = report_contents(plan, found, title=" ".join(options.words), root=root, endings=ends)

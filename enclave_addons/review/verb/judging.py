@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
-
-import yaml
+from typing import NamedTuple
 
 from enclave_addons.review.checks import MEANINGS, check_plan
 from enclave_addons.review.checks.keystore import against_keystore, against_router
@@ -25,15 +22,21 @@ from enclave_addons.review.verb.keystores import (
     zenoh_findings,
 )
 from enclave_common.command_line import PATH, Option
-from enclave_common.files import read_text
+from enclave_common.files import text_or_nothing
+from enclave_common.project import Project
+from enclave_common.project_file import ReviewRules, read_review_rules
+from enclave_common.strict_yaml import YamlFileError, line_at
 from enclave_common.words import did_you_mean
-from enclave_common.yaml_reader import load_strict_yaml, problem_of
 from enclave_launch.dry_run import Diagnostic, DryRun
 from enclave_launch.errors import UsageError, translated
 from keystore.formats.permissions_patterns import can_meet
 
 EXPECTATIONS = "enclaves.review.yaml"
-EXPECT: Option = ("--expect FILE", PATH, f"default: {EXPECTATIONS}, if it exists")
+EXPECT: Option = (
+    "--expect FILE",
+    PATH,
+    f"rules beside those of enclaves.yaml (default: {EXPECTATIONS}, if it exists)",
+)
 WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what expires soon (30d)")
 
 
@@ -43,12 +46,13 @@ def judged(
     keystore: Path | str | None = None,
     within: str = DEFAULT_MARGIN,
     now: datetime | None = None,
+    project: Project | None = None,
 ) -> list[tuple[Diagnostic, str | None]]:
-    """Return findings of a dry run, of the rules in ``expect``, and of ``keystore``, if one is given.
+    """Return findings of a dry run, of the rules in ``project`` and ``expect``, and of ``keystore``, if one is given.
 
     Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
     """
-    expected = expectations(expect)
+    expected = expectations(expect, project)
     findings = [*check_plan(document), *rule_findings(document, expected.never)]
     if keystore is not None:
         findings += _of_keystore(document, keystore, within, now)
@@ -65,19 +69,39 @@ def _of_keystore(
     return found
 
 
-def expectations(file: Path | None) -> Expectations:
-    """Read the expectations; raises ``UsageError`` for a named file that is missing, and for invalid content."""
-    if file is None:
-        if not os.path.exists(EXPECTATIONS):
-            return Expectations()
-        file = Path(EXPECTATIONS)
-    with translated(OSError, UsageError, f"{file}: "), translated(ValueError, UsageError, f"{file}: "):
-        text = read_text(file)
-        try:
-            content, lines = load_strict_yaml(text)
-        except yaml.YAMLError as error:
-            raise UsageError(problem_of(error, str(file))) from None
-    return read_expectations(content or {}, str(file), lines)
+def expectations(file: Path | None, project: Project | None = None) -> Expectations:
+    """Read the rules of ``enclaves.yaml`` and of a file of their own.
+
+    Args:
+        file: The file that was named, by default ``enclaves.review.yaml`` in the working directory, if it exists.
+        project: The ``enclaves.yaml`` in use.
+
+    Raises:
+        UsageError: The file does not exist or is not understood.
+    """
+    found = _read_rules(project.content, project.file) if project is not None else Expectations()
+    if file is None and not os.path.exists(EXPECTATIONS):
+        return found
+    file = file or Path(EXPECTATIONS)
+    with translated(YamlFileError, UsageError):
+        own = _read_rules(read_review_rules(file), file)
+    return Expectations((*found.never, *own.never), (*found.accept, *own.accept))
+
+
+def _read_rules(rules: ReviewRules, file: Path) -> Expectations:
+    text = text_or_nothing(file)
+    return Expectations(
+        tuple(
+            Never(rule.source, rule.target, rule.why, (str(file), line_at(text, ("never", at))))
+            for at, rule in enumerate(rules.never or ())
+        ),
+        tuple(
+            Accepted(
+                _known_code(rule.code, f"{file}:{line_at(text, ('accept', at))}"), rule.subject, rule.why
+            )
+            for at, rule in enumerate(rules.accept or ())
+        ),
+    )
 
 
 _TAKES = ("subscribe", "serve_services", "serve_actions")
@@ -113,29 +137,6 @@ class Expectations(NamedTuple):
     def reason_to_accept(self, diagnostic: Diagnostic) -> str | None:
         """Return why a finding was accepted, None if it was not."""
         return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
-
-
-def read_expectations(
-    content: Any, place: str, lines: Mapping[int, int] = MappingProxyType({})
-) -> Expectations:
-    """Read a parsed YAML document (docs/secure-plan.md); raises ``UsageError`` if it is not such a file.
-
-    ``lines``: of its entries, by ``id``.
-    """
-    if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
-        raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
-    return Expectations(
-        tuple(
-            Never(source, target, why, (place, lines.get(id(item), 0)))
-            for item in _items(content, "never", place)
-            for source, target, why in [_texts(item, ("from", "to"), ("why",), f"{place}: never")]
-        ),
-        tuple(
-            Accepted(_known_code(code, place), subject or "*", why)
-            for item in _items(content, "accept", place)
-            for code, why, subject in [_texts(item, ("code", "why"), ("subject",), f"{place}: accept")]
-        ),
-    )
 
 
 def _known_code(code: str, place: str) -> str:
@@ -206,20 +207,3 @@ def _with_grant(plan: PlanDocument, operations: Collection[str], pattern: str) -
         for path, grants in sorted(plan.enclaves.items())
     }
     return {path: Hop(*each[0]) for path, each in granted.items() if each}
-
-
-def _items(content: Mapping[str, Any], key: str, place: str) -> list[Any]:
-    items = content.get(key) or []
-    if not isinstance(items, list):
-        raise UsageError(f"{place}: '{key}' must be a list")
-    return items
-
-
-def _texts(item: Any, needed: tuple[str, ...], optional: tuple[str, ...], place: str) -> list[str]:
-    if not isinstance(item, Mapping) or item.keys() - {*needed, *optional} or not item.keys() >= set(needed):
-        also = f", and may have {', '.join(optional)}" if optional else ""
-        raise UsageError(f"{place}: each entry needs {', '.join(needed)}{also}; this one is {item!r}")
-    values = [item.get(key, "") for key in (*needed, *optional)]
-    if not all(isinstance(value, str) for value in values):
-        raise UsageError(f"{place}: texts expected in {item!r}")
-    return values

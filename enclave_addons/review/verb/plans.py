@@ -49,9 +49,8 @@ def is_saved_plan(words: Sequence[str]) -> bool:
 
 def _saved_as_named(words: Sequence[str], options: argparse.Namespace) -> tuple[Mapping[str, Any], DryRun]:
     """Read a saved plan; raises ``UsageError`` for arguments and options of planning, which would have no effect."""
-    defaults = {written.split()[0]: kind.get("default") for written, kind, _ in (*POLICY, *EVALUATION)}
-    values = {flag: getattr(options, flag[2:].replace("-", "_"), None) for flag in defaults}
-    idle = [*words[1:], *(flag for flag, value in values.items() if value and value != defaults[flag])]
+    flags = [written.split()[0] for written, *_ in (*POLICY, *EVALUATION)]
+    idle = [*words[1:], *(flag for flag in flags if flag[2:].replace("-", "_") in options.given)]
     if idle:
         raise UsageError(
             f"{idle[0]} has no effect: {words[0]} is a saved plan; plan the launch file again with it"

@@ -22,8 +22,9 @@ from enclave_addons.review.markdown import markdown_report
 from enclave_addons.review.verb.judging import EXPECT, judged
 from enclave_addons.review.verb.keystores import endings
 from enclave_addons.review.verb.plans import read_plan
-from enclave_common.command_line import PATH, one_of
+from enclave_common.command_line import PATH, FromProject, one_of
 from enclave_common.files import write_text
+from enclave_common.project import Project
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, translated
 
@@ -31,7 +32,11 @@ OPTIONS = {
     "": (
         ("--format", one_of("html", "markdown", "dot", "mermaid"), "what to write (html)"),
         ("-o --output FILE", PATH, "default: standard output"),
-        ("--keystore DIR", PATH, "report how it differs, and what expires"),
+        (
+            "--keystore DIR",
+            {**PATH, "configured": FromProject("keystore", if_exists=True)},
+            "report how it differs, and what expires",
+        ),
         EXPECT,
     )
 }
@@ -41,7 +46,14 @@ def run(options: argparse.Namespace) -> int:
     """Print or write the report. Returns 0."""
     document = read_plan(options.words, options)
     title = " ".join(options.words)
-    text = report_text(document, options.format, title, keystore=options.keystore, expect=options.expect)
+    text = report_text(
+        document,
+        options.format,
+        title,
+        keystore=options.keystore,
+        expect=options.expect,
+        project=options.project,
+    )
     if options.output is None:
         sys.stdout.write(text)
         return 0
@@ -57,13 +69,14 @@ def report_text(
     *,
     keystore: Path | str | None = None,
     expect: Path | None = None,
+    project: Project | None = None,
 ) -> str:
     """Return the report on a dry run in the given form; raises UsageError and ProvisionError."""
     if form in ("dot", "mermaid"):
         return (dot if form == "dot" else mermaid)(plan_graph(document))
 
     ends = endings(keystore) if keystore is not None else None
-    found = judged(document, expect, keystore)
+    found = judged(document, expect, keystore, project=project)
     contents = report_contents(document, found, title=title, root=os.getcwd(), endings=ends)
     if form == "markdown":
         return markdown_report(contents)
