@@ -134,7 +134,6 @@ class CommandParser(argparse.ArgumentParser):
     def __init__(self, **settings: Any):
         self.arguments: list[argparse.Action] = []
         self.verbs: dict[str, CommandParser] = {}
-        self._is_verb = False
         self.verb_dest = ""
         texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
         form = {"allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter}
@@ -166,7 +165,6 @@ class CommandParser(argparse.ArgumentParser):
             "epilog": f"{mark}{status}" if mark else None,
         }
         self.verbs[name] = self._add_parser(name, **{**head, **settings})
-        self.verbs[name]._is_verb = True
         return self.verbs[name]
 
     def add_verb_modules(self, package: str, names: Iterable[str]) -> Iterator[tuple[CommandParser, Any]]:
@@ -239,14 +237,6 @@ class CommandParser(argparse.ArgumentParser):
         ]
         verb = ["VERB ..."] if self.verbs else []
         return " ".join(("%(prog)s", *required, "[options]", *arguments, *verb))
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse as argparse does, but let a verb report what it does not know: the command would suggest options of
-        its other verbs."""
-        found, unknown = super().parse_known_args(args, namespace)
-        if unknown and self._is_verb:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and exit with status 2, as argparse."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from enclave_common.command_line import FLAG, CommandParser, one_of
+from enclave_common.command_line import FLAG, CommandParser, one_of, read_command_line
 from enclave_common.words import did_you_mean
 
 
@@ -46,7 +46,7 @@ def parser() -> CommandParser:
 )
 def test_slips_of_the_command_line(words: list[str], answer: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
-        parser().parse_args(words)
+        read_command_line(parser(), words)
     assert ended.value.code == 2
     assert answer in capsys.readouterr().err
 
@@ -66,9 +66,9 @@ def test_an_option_of_another_verb_is_not_suggested(capsys: pytest.CaptureFixtur
     made.add_verb("list", "List them.").add_options((("--all", FLAG, ""),))
     for words in (["verify", "--all"], ["list", "--formt", "json"]):
         with pytest.raises(SystemExit):
-            made.parse_args(words)
+            read_command_line(made, words)
         told = capsys.readouterr().err
         assert "did you mean" not in told and f"tool {words[0]}: error: unrecognized" in told
     with pytest.raises(SystemExit):
-        made.parse_args(["list", "--al"])
+        read_command_line(made, ["list", "--al"])
     assert "did you mean '--all'?" in capsys.readouterr().err
