@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.enclave import EnclaveScope
@@ -25,7 +26,22 @@ if TYPE_CHECKING:
     from enclave_launch.runtime.companion import LaunchCompanion
 
 
-class _ResolveOptions(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class ResolveOptions:
+    """Options of ``resolve``. Of several paths or names any sequence is taken, and a single one alone.
+
+    Args:
+        prefixes: Install prefixes, searched before ``AMENT_PREFIX_PATH``.
+        manifests: NoDL documents or folders; they win where definitions conflict.
+        policy: An SROS2 policy whose rules are granted beside the derived ones.
+        distro: The release of ROS; ``None`` is ``ROS_DISTRO``, else the newest.
+        infer: Analyse the sources of nodes without a manifest.
+        library: Use the library for nodes without a manifest.
+        library_folders: Folders of library documents, which come first.
+        source_folders: Where sources of compiled nodes lie, besides the workspaces of the prefixes.
+        progress: Called with each program that is analysed.
+    """
+
     prefixes: tuple[Path, ...] = ()
     manifests: tuple[Path, ...] = ()
     policy: Path | None = None
@@ -41,34 +57,16 @@ class _ResolveOptions(NamedTuple):
     accept_prefixes: tuple[str, ...] = ()
     accept_middlewares: tuple[str, ...] = ()
     no_python: bool = False
-    launch_configurations: Mapping[str, str] = {}  # never changed
+    launch_configurations: Mapping[str, str] = field(default_factory=dict)
     progress: Callable[[str], None] | None = None
 
-
-class ResolveOptions(_ResolveOptions):
-    """Options of ``resolve``.
-
-    ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``, else the newest;
-    ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their sources be
-    analysed, ``library`` the library be used, whose documents in ``library_folders`` come first; ``source_folders``:
-    where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is called
-    with each program that is analysed."""
-
-    __slots__ = ()
-
-    if not TYPE_CHECKING:  # who checks types sees the fields
-
-        def __new__(cls, *args: Any, **given: Any) -> ResolveOptions:
-            """Accept a single path or name where several are possible: text is not split into letters."""
-            options = super().__new__(cls, *args, **given)
-            paths = ("prefixes", "manifests", "library_folders", "source_folders")
-            names = ("also", "accept_prefixes", "accept_middlewares")
-            return options._replace(
-                **{name: tuple(map(Path, _several(getattr(options, name)))) for name in paths},
-                **{name: _several(getattr(options, name)) for name in names},
-                policy=None if options.policy is None else Path(options.policy),
-                enclave_scope=EnclaveScope(options.enclave_scope),
-            )
+    def __post_init__(self) -> None:
+        for name in ("prefixes", "manifests", "library_folders", "source_folders"):
+            object.__setattr__(self, name, tuple(map(Path, _several(getattr(self, name)))))
+        for name in ("also", "accept_prefixes", "accept_middlewares"):
+            object.__setattr__(self, name, _several(getattr(self, name)))
+        object.__setattr__(self, "policy", None if self.policy is None else Path(self.policy))
+        object.__setattr__(self, "enclave_scope", EnclaveScope(self.enclave_scope))
 
     def host_options(self) -> HostOptions:
         """Return the options of the evaluation's host, the same in a dry run and live."""
@@ -89,7 +87,8 @@ def _several(given: Any) -> tuple[Any, ...]:
     return (given,) if isinstance(given, (str, os.PathLike)) else tuple(given)
 
 
-class SecurityOptions(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class SecurityOptions:
     """Options of ``provision``: the keystore's own (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
     the strategy of the processes (``ROS_SECURITY_STRATEGY``)."""
 
@@ -108,7 +107,8 @@ class Deadline:
         self.reached = False
 
 
-class RunSettings(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class RunSettings:
     """Options of ``run``.
 
     ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after which a log file

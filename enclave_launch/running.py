@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import partial
 
 from enclave_common.add_ons import add_on
@@ -88,7 +89,7 @@ def _live(launch: _Launch, settings: RunSettings) -> partial[LiveLaunch]:
     return partial(
         LiveLaunch,
         _source(launch),
-        settings._replace(secrets=settings.secrets | own, companion=_companion(launch, settings)),
+        replace(settings, secrets=settings.secrets | own, companion=_companion(launch, settings)),
         gate=_gate(launch, settings),
         needs_ros_services=needed,
     )

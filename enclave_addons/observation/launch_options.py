@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def launch(target: LaunchTarget, options: argparse.Namespace, keystore: str | No
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
     """Run and watch an unsecured launch; return its status, 1 if there were alarms. Raises UsageError."""
     watch = DriftWatch(_dry_run(plan), _options(options))
-    return watch.status(run_unsecured(plan, options=settings._replace(watch=watch)))
+    return watch.status(run_unsecured(plan, options=replace(settings, watch=watch)))
 
 
 def check_watch(plan: LaunchPlan) -> None:

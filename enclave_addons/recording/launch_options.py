@@ -13,6 +13,7 @@ import socket
 import struct
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 
@@ -113,7 +114,7 @@ def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSet
     warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])
-    status = run_unsecured(plan, options=settings._replace(companion=recording))
+    status = run_unsecured(plan, options=replace(settings, companion=recording))
     report = audit.report()
     sys.stdout.write(audit_text(report))
     if options.audit_report is not None:

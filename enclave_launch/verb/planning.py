@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from dataclasses import replace
 
 from enclave_common.terminal import progress
 from enclave_launch.flow import resolve
@@ -24,5 +25,5 @@ def planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | N
 
 def resolve_target(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
     """Plan ``target``; on a terminal, report what takes long."""
-    chosen = resolve_options(options)._replace(progress=progress("analysing", quiet=options.quiet))
+    chosen = replace(resolve_options(options), progress=progress("analysing", quiet=options.quiet))
     return resolve(target.launch_file, target.arguments, options=chosen)

@@ -7,7 +7,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Protocol
 
@@ -99,7 +99,7 @@ def _launch_plainly(
     """Launch without enclaves: nobody has to know what the nodes say to each other."""
     launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-    return run_unsecured(launch, options=run_settings(options)._replace(companion=companion))
+    return run_unsecured(launch, options=replace(run_settings(options), companion=companion))
 
 
 def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str, company: Company) -> int | None:
@@ -122,7 +122,7 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str, compan
         return 0
     deadline = renewal_deadline(launch, utc_now()) if options.restart_expiring else None
     watch = company.watch(launch)
-    settings = run_settings(options)._replace(companion=company.companion, deadline=deadline, watch=watch)
+    settings = replace(run_settings(options), companion=company.companion, deadline=deadline, watch=watch)
     status = run(launch, options=settings)
     if watch is not None:
         status = watch.status(status)

@@ -72,7 +72,7 @@ def test_move_group_has_the_parameters_of_the_package_and_those_of_moveit(launch
     (process,) = launch(MOVE_GROUP).processes
     found = process.parameters
     assert process.program == "moveit_ros_move_group/move_group"
-    assert found["robot_description"].endswith('<robot name="arm"><link name="base"/></robot>')
+    assert str(found["robot_description"]).endswith('<robot name="arm"><link name="base"/></robot>')
     assert found["robot_description_kinematics.hand.kinematics_solver"] == "kdl"
     assert found["robot_description_planning.joint_limits.j1.max_velocity"] == 2.5
     assert found["robot_description_planning.cartesian_limits.max_trans_vel"] == 1.0
