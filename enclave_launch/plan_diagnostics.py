@@ -19,7 +19,12 @@ from enclave_launch.diagnostics.enclaves import (
     handshake_fails,
     machine_elsewhere,
 )
-from enclave_launch.diagnostics.evaluation import nodes_renamed_alike, parameter_type, parameters_unknown
+from enclave_launch.diagnostics.evaluation import (
+    nodes_renamed_alike,
+    parameter_type,
+    parameters_opaque,
+    parameters_unknown,
+)
 from enclave_launch.diagnostics.permissions import (
     configuration_unused,
     descriptions_differ,
@@ -64,9 +69,13 @@ def problems(
             yield command_needs_enclave(name, shlex.join(command), instead_of(command), place)
         for path, why in item.process.unread_parameter_files:
             yield parameters_unknown(name, path, why, place)
+        for unknown in item.process.unknown_parameters:
+            yield parameters_opaque(name, unknown.value, unknown.module, place)
     for component in components:
         if component.missing:
             yield _missing(component.missing, component.location)
+        for unknown in component.component.unknown_parameters:
+            yield parameters_opaque(component.fqn, unknown.value, unknown.module, component.location)
 
 
 def _ros2_command(item: PlannedProcess) -> tuple[str, ...] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -49,6 +50,14 @@ class Respawn(NamedTuple):
     retries: int = -1
 
 
+@dataclass(frozen=True)
+class UnknownParameters:
+    """Parameters that a Python module which is not installed would have given. ``value`` is the launch file's text."""
+
+    value: str
+    module: str
+
+
 class ResolvedProcess(NamedTuple):
     """One process. ``cmd`` is what would be executed, prefix included, without ``--enclave``."""
 
@@ -71,6 +80,7 @@ class ResolvedProcess(NamedTuple):
     shell: bool = False
     parameter_files: Mapping[str, str] = MappingProxyType({})  # "<params:N>" -> YAML text
     unread_parameter_files: tuple[tuple[str, str], ...] = ()  # path, and why it could not be read
+    unknown_parameters: tuple[UnknownParameters, ...] = ()
     prefix: tuple[str, ...] = ()  # words of cmd before the program: launch-prefix
     final_environment: Mapping[str, str] = MappingProxyType({})  # all of it, inherited variables included
     machine: str | None = None  # of the launch file: the host it is meant for
@@ -95,6 +105,7 @@ class ResolvedComponent(NamedTuple):
     extra_arguments: Mapping[str, ParameterValue]
     location: SourceLocation
     on_event: str | None = None
+    unknown_parameters: tuple[UnknownParameters, ...] = ()
 
     @property
     def program(self) -> str:

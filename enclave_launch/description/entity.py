@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description import read_only
 from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.events.event import ExecutionComplete
+from enclave_launch.description.location import location_of
+from enclave_launch.description.substitution import OpaqueValueUsed
 from enclave_launch.host.user_code import executed_once, is_users
+from enclave_launch.process import Unforeseeable
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
@@ -147,13 +150,23 @@ class Action(LaunchDescriptionEntity):
         return [(f"Conditionally included by {self.describe()}", self.get_sub_entities())]
 
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
-        if self.__condition is not None and not self.__condition.evaluate(context):
+        if not self.__holds(context):
             return None
         try:
             return self.execute(context)
         finally:
             if context.awaits_completion():
                 _report_completion(self, context)
+
+    def __holds(self, context: LaunchContext) -> bool:
+        """Evaluate the condition. One that is not known does not hold, and is reported."""
+        try:
+            return self.__condition is None or self.__condition.evaluate(context)
+        except OpaqueValueUsed as error:
+            what = f"whether this {type(self).__name__} is executed, which depends on {error.value}"
+            text = f"{what}: the Python module '{error.module}' is not installed"
+            context.host.unforeseeable(Unforeseeable(text, location_of(self, context)))
+            return False
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
         """Execute the action and return the entities to visit next. The base does nothing."""

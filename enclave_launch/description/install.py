@@ -9,6 +9,7 @@ table ``upstream_paths``; each name is looked up when first used.
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,8 +20,9 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from enclave_launch.description.absent_modules import AbsentModules, OpaqueValue
 from enclave_launch.description.upstream_paths import GATES, PATHS
-from enclave_launch.host.current import current_release
+from enclave_launch.host.current import current_host, current_release
 
 _OURS = "enclave_launch.description."
 
@@ -182,13 +184,13 @@ def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
         sys.modules.setdefault(name, module)
     path = list(sys.path)
     sys.path.extend(folder for folder in _python_folders(prefixes) if folder not in sys.path)
-    sys.meta_path.insert(0, _FINDER)
-    sys.meta_path.append(_FALLBACK_FINDER)
+    sys.meta_path[:] = [*_first_finders(), *sys.meta_path, *_last_finders()]
     try:
         yield
     finally:
-        sys.meta_path.remove(_FINDER)
-        sys.meta_path.remove(_FALLBACK_FINDER)
+        for finder in {_FINDER, _XACRO_FINDER, _FALLBACK_FINDER, _ABSENT}.intersection(sys.meta_path):
+            sys.meta_path.remove(finder)
+        _ABSENT.forget()
         sys.path[:] = path
         _withdraw(before)
         sys.modules.update(hidden)
@@ -209,6 +211,23 @@ class _Finder(MetaPathFinder):
 
 _FINDER = _Finder(PUBLIC_NAMES)
 _FALLBACK_FINDER = _Finder(FALLBACK_NAMES)
+_XACRO_FINDER = _Finder(("xacro",))
+_ABSENT = AbsentModules(PUBLIC_NAMES, FALLBACK_NAMES)
+
+
+def _first_finders() -> list[MetaPathFinder]:
+    """Return what is asked before Python's own finders.
+
+    Where packages may be missing, the program xacro is used in the place of an installed Python package of that name: a
+    placeholder stands for a description that includes a missing package.
+    """
+    with_program = current_host().allow_missing_packages and shutil.which("xacro") is not None
+    return [_FINDER, *([_XACRO_FINDER] if with_program else [])]
+
+
+def _last_finders() -> list[MetaPathFinder]:
+    """Return what is asked about modules that are not installed."""
+    return [_FALLBACK_FINDER, *([_ABSENT] if current_host().allow_missing_packages else [])]
 
 
 def is_public(module: str) -> bool:
@@ -231,7 +250,9 @@ def _withdraw(before: set[str]) -> None:
             del sys.modules[name]
     new = {name for name in sys.modules if name not in before and _may_be_guest(name)}
     for name in _dependents(new, lambda origin: origin.startswith(_OURS) or is_public(origin)):
-        _guests[name] = sys.modules.pop(name)
+        module = sys.modules.pop(name)
+        if not any(isinstance(value, OpaqueValue) for value in vars(module).values()):
+            _guests[name] = module
 
 
 def _may_be_guest(name: str) -> bool:

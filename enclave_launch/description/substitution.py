@@ -61,6 +61,21 @@ class SubstitutionFailure(RuntimeError):
     """The message says why."""
 
 
+class OpaqueValueUsed(TypeError):
+    """A launch file needs the value of something that a module which is not installed would have given.
+
+    A ``TypeError``: ``list()`` asks for a length first, and goes on without.
+    """
+
+    def __init__(self, value: str, module: str, use: str) -> None:
+        self.value = value
+        self.module = module
+        super().__init__(
+            f"{value} is used as {use}, and is not known: the Python module '{module}' is not installed; install it, "
+            "for dry runs go on only where such a value is handed on"
+        )
+
+
 # What an action accepts where text is expected: text, a substitution, or a sequence of both to concatenate.
 
 SomeSubstitutionsType = str | Substitution | collections.abc.Iterable[str | Substitution]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.absent_modules import OpaqueValue
 from enclave_launch.description.actions.includes import IncludeLaunchDescription, opened
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.location import annotate, includes_below
@@ -43,6 +44,8 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
             future = current.get_asyncio_future()
             if future is not None:
                 futures.append((current, future))
+            if isinstance(sub_entities, OpaqueValue):  # which a function of the launch file returned
+                sub_entities = [sub_entities]
             if sub_entities is not None:
                 stack.append((iter(sub_entities), _surroundings_below(current, context)))
     except error_location.RAISED_BY_USER_CODE as error:  # noted where it happened, and raised again
@@ -92,7 +95,8 @@ def run_handler(context: LaunchContext, handler: Handler, event: Event, mark: st
 
 
 def _entities(result: Any) -> Iterable[Any]:
-    for entity in result if isinstance(result, Iterable) else (result,):
+    is_several = isinstance(result, Iterable) and not isinstance(result, OpaqueValue)
+    for entity in result if is_several else (result,):
         if entity is None:
             continue
         if not isinstance(entity, LaunchDescriptionEntity):

@@ -100,6 +100,19 @@ def package_not_installed(package: str, placeholder: str) -> Diagnostic:
     return Diagnostic(Code.PACKAGE_NOT_INSTALLED, package, text)
 
 
+def module_not_installed(module: str) -> Diagnostic:
+    """Warn, with ``--allow-missing-packages``, about a Python module that a launch file imports."""
+    text = f"Python module '{module}' is not installed; what it would give is not known"
+    return Diagnostic(Code.PACKAGE_NOT_INSTALLED, module, text)
+
+
+def parameters_opaque(node: str, value: str, module: str, place: SourceLocation) -> Diagnostic:
+    """Report parameters that a Python module which is not installed would have given."""
+    text = f"the parameters that {node} would get from {value} are not known"
+    remedy = f"install the Python module '{module}', or the package that brings it"
+    return Diagnostic(Code.PARAMETERS_UNKNOWN, node, text, place, remedy)
+
+
 def parameter_file_missing(path: str) -> Diagnostic:
     """Warn. The message has the beginning of a long ``path``, which may be a whole URDF by mistake."""
     named = path if len(path) <= _LONGEST_PATH else f"{path[:_LONGEST_PATH]} ..."

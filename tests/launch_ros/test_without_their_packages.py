@@ -224,6 +224,29 @@ def test_without_the_program_there_is_an_error_or_a_placeholder(
     assert "program-not-installed" in [str(warning.code) for warning in found.warnings]
 
 
+@pytest.mark.parametrize("may_lack_packages", [False, True])
+def test_an_installed_xacro_is_replaced_by_its_program_where_packages_may_be_missing(
+    launched: Evaluate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, may_lack_packages: bool
+) -> None:
+    (tmp_path / "xacro.py").write_text("def process_file(file): raise LookupError('no package a_gripper')\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    program = tmp_path / "xacro"
+    program.write_text("#!/bin/sh\necho \"package 'a_gripper' not found\" >&2\nexit 2\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    text = FILE.format(
+        before="import xacro; d = xacro.process_file('/a.xacro')", parameters="{'p': d.toxml()}"
+    )
+    if not may_lack_packages:
+        with pytest.raises(EvaluationError, match="no package a_gripper"):
+            launched(text, syntax="py")
+        return
+    found = launched(text, syntax="py", allow_missing_packages=True)
+    assert found.processes[0].parameters == {
+        "p": "<output of xacro, whose package a_gripper is not installed>"
+    }
+
+
 def test_a_launch_file_logs_with_rclpy(launched: Evaluate, caplog: pytest.LogCaptureFixture) -> None:
     before = (
         "import rclpy.logging; log = rclpy.logging.get_logger('bringup'); log.get_child('arm').warn('slow')"

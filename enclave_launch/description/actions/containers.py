@@ -31,14 +31,14 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.process import LauncherCall, ProcessKind, RemapRule, ResolvedComponent
+from enclave_launch.process import LauncherCall, ProcessKind, RemapRule, ResolvedComponent, UnknownParameters
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
-    from enclave_launch.description.parameters.types import Parameters
+    from enclave_launch.description.parameters.types import EvaluatedParameters
 
 
 @expose_action("node_container")
@@ -178,6 +178,8 @@ class LoadComposableNodes(Action):
         )
         remaps = tuple(_remap_rules(description, context, place))
         parameters = [*_global_parameters(context), *(description.parameters or ())]
+        evaluated = evaluate_parameters(context, parameters)
+        extra_arguments = evaluate_parameters(context, description.extra_arguments or ())
         return ResolvedComponent(
             container=container,
             package=package,
@@ -185,10 +187,13 @@ class LoadComposableNodes(Action):
             name=name,
             namespace=namespace or "",
             remaps=remaps,
-            parameters=_values(context, name, namespace, parameters),
-            extra_arguments=_values(context, name, namespace, description.extra_arguments or ()),
+            parameters=_values(context, name, namespace, evaluated),
+            extra_arguments=_values(context, name, namespace, extra_arguments),
             location=place,
             on_event=context.on_event,
+            unknown_parameters=tuple(
+                item for item in (*evaluated, *extra_arguments) if isinstance(item, UnknownParameters)
+            ),
         )
 
 
@@ -217,9 +222,8 @@ def _global_parameters(context: LaunchContext) -> Iterator[Any]:
 
 
 def _values(
-    context: LaunchContext, name: str, namespace: str | None, parameters: Parameters
+    context: LaunchContext, name: str, namespace: str | None, evaluated: EvaluatedParameters
 ) -> dict[str, ParameterValue]:
-    evaluated = evaluate_parameters(context, parameters)
     return {
         item.name: tuple(item.value) if isinstance(item.value, list) else item.value  # type: ignore[misc]
         for item in to_parameters_list(context, name, namespace, evaluated)

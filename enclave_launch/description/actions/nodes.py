@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description import read_only
+from enclave_launch.description.absent_modules import OpaqueValue
 from enclave_launch.description.actions.processes import ExecuteProcess
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.entity import Entity, Parser, get_data_type_from_identifier
@@ -101,11 +102,11 @@ class Node(ExecuteProcess):
         **kwargs: Any,
     ):
         program = executable if package is None else ExecutableInPackage(executable, package)
-        user_words: list[SomeSubstitutionsType] = list(arguments or ())
+        user_words: list[SomeSubstitutionsType] = [] if arguments is None else list(arguments)
         if ros_arguments is not None:
             user_words += ["--ros-args"] + ros_arguments  # noqa: RUF005  # a TypeError unless it is a list
         name_words: list[SomeSubstitutionsType] = [] if name is None else ["-r", RosSpecificArgument("name")]
-        if parameters is not None:
+        if parameters is not None and not isinstance(parameters, OpaqueValue):
             ensure_argument_type(parameters, list, "parameters", "Node")
         super().__init__(
             cmd=[program, *user_words, "--ros-args", *name_words], **{**kwargs, "name": exec_name}
@@ -114,8 +115,8 @@ class Node(ExecuteProcess):
         self.__node_executable = executable
         self.__name = None if name is None else normalize_to_list_of_substitutions(name)
         self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
-        self.__parameters = NodeParameters(normalize_parameters(parameters or []))
-        self.__remappings = list(normalize_remap_rules(remappings or ()))
+        self.__parameters = NodeParameters(normalize_parameters([] if parameters is None else parameters))
+        self.__remappings = list(normalize_remap_rules(() if remappings is None else remappings))
         self.__expanded_name = UNSPECIFIED_NODE_NAME
         self.__expanded_node_namespace = UNSPECIFIED_NODE_NAMESPACE
         self.__final_name: str | None = None
@@ -222,6 +223,7 @@ class Node(ExecuteProcess):
             fqn=self.node_name,
             remaps=tuple(self.__placed_remaps(process)),
             parameters=parameters.values,
+            unknown_parameters=self.__parameters.unknown,
             unread_parameter_files=tuple(
                 (context.host.parameter_file_sources.get(path, path), why) for path, why in parameters.unread
             ),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -13,12 +12,14 @@ from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.descriptions import Parameter, ParameterFile, ParameterValue
-from enclave_launch.description.substitution import Substitution, perform_substitutions
+from enclave_launch.description.substitution import OpaqueValueUsed, Substitution, perform_substitutions
 from enclave_launch.host.current import current_release
+from enclave_launch.process import UnknownParameters
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.parameters.types import (
+        EvaluatedParameter,
         EvaluatedParameters,
         EvaluatedParameterValue,
         Parameters,
@@ -29,22 +30,35 @@ _SCALARS = (bool, int, float, str)
 
 
 def evaluate_parameters(context: LaunchContext, parameters: Parameters) -> EvaluatedParameters:
-    """Return files as paths, dicts with their values, ``Parameter`` descriptions unchanged, in the given order."""
-    evaluated: list[Path | Parameter | dict[str, EvaluatedParameterValue]] = []
+    """Return files as paths, dicts with their values, ``Parameter`` descriptions unchanged, in the given order.
+
+    What a Python module that is not installed would give is ``UnknownParameters``.
+    """
+    evaluated: list[EvaluatedParameter] = []
     for item in parameters:
-        if isinstance(item, ParameterFile):
-            evaluated.append(item.evaluate(context))
-        elif isinstance(item, Parameter):
+        if isinstance(item, Parameter):
             evaluated.append(item)
         elif isinstance(item, Mapping):
-            evaluated.append(evaluate_parameter_dict(context, item))
+            unknown: list[UnknownParameters] = []
+            evaluated.append(evaluate_parameter_dict(context, item, unknown))
+            evaluated += unknown
+        elif isinstance(item, ParameterFile):
+            try:
+                evaluated.append(item.evaluate(context))
+            except OpaqueValueUsed as error:
+                evaluated.append(UnknownParameters(error.value, error.module))
+        else:
+            evaluated.append(UnknownParameters(item.opaque_text, item.opaque_module))
     return tuple(evaluated)
 
 
 def evaluate_parameter_dict(
-    context: LaunchContext, parameters: ParametersDict
+    context: LaunchContext, parameters: ParametersDict, unknown: list[UnknownParameters] | None = None
 ) -> dict[str, EvaluatedParameterValue]:
-    """Perform names and values of a normalized dict; raises ``TypeError`` for what cannot be a parameter."""
+    """Perform names and values of a normalized dict; raises ``TypeError`` for what cannot be a parameter.
+
+    Values that a Python module which is not installed would give are added to ``unknown``, where it is given.
+    """
     if not isinstance(parameters, Mapping):
         raise TypeError("expected dict")
     evaluated: dict[str, EvaluatedParameterValue] = {}
@@ -52,7 +66,12 @@ def evaluate_parameter_dict(
         if not isinstance(key, tuple):
             raise TypeError(f"Expecting tuple of substitutions got {key!r}")
         name = perform_substitutions(context, list(key))
-        evaluated[name] = _evaluate_value(context, name, value)
+        try:
+            evaluated[name] = _evaluate_value(context, name, value)
+        except OpaqueValueUsed as error:
+            if unknown is None:
+                raise
+            unknown.append(UnknownParameters(error.value, error.module))
     return evaluated
 
 

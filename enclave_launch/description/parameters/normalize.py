@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.absent_modules import OpaqueValue
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.parameters.descriptions import Parameter, ParameterFile, ParameterValue
 from enclave_launch.description.parameters.yaml_text import YamlConstant
@@ -36,15 +37,17 @@ _ITEM_TYPES = (float, int, str, bool, *SomeSubstitutionsType_types_tuple)
 
 def normalize_parameters(parameters: SomeParameters) -> Parameters:
     """Bring parameters into one form; raises ``TypeError`` for a lone string or another non-sequence."""
+    if isinstance(parameters, OpaqueValue):
+        return (parameters,)
     if isinstance(parameters, str) or not isinstance(parameters, Sequence):
         raise TypeError(f"Expecting list of parameters, got {parameters}")
     return tuple(_normalize(item) for item in parameters)
 
 
-def _normalize(item: Any) -> ParameterFile | Parameter | ParametersDict:
+def _normalize(item: Any) -> ParameterFile | Parameter | ParametersDict | OpaqueValue:
     if isinstance(item, Mapping):
         return normalize_parameter_dict(item)
-    if isinstance(item, (Parameter, ParameterFile)):
+    if isinstance(item, (Parameter, ParameterFile, OpaqueValue)):
         return item
     return ParameterFile(item)
 

@@ -15,6 +15,7 @@ from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.descriptions import Parameter
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
+from enclave_launch.process import UnknownParameters
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.rcl_parameters import (
     ResolvedParameters,
@@ -47,6 +48,12 @@ class NodeParameters:
 
     def __init__(self, own: Parameters):
         self.__own = own
+        self.__unknown: list[UnknownParameters] = []
+
+    @property
+    def unknown(self) -> tuple[UnknownParameters, ...]:
+        """Parameters that Python modules which are not installed would have given."""
+        return tuple(self.__unknown)
 
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Return words to append to the command line. ``section`` is the node's full name, or ``/**``."""
@@ -56,6 +63,9 @@ class NodeParameters:
         return words
 
     def __own_words(self, context: LaunchContext, section: str, item: Any) -> Sequence[str]:
+        if isinstance(item, UnknownParameters):
+            self.__unknown.append(item)
+            return ()
         if isinstance(item, Parameter):
             name, value = item.evaluate(context)
             return ("-p", f"{name}:={yaml_text.dump(value)}")
@@ -133,6 +143,8 @@ def to_parameters_list(
     current: Mapping[str, Any] = {}
     warned = False
     for item in evaluated_parameters:
+        if isinstance(item, UnknownParameters):
+            continue
         if isinstance(item, os.PathLike):
             content, has_sections = _applicable(_read(context, item), section)
             if has_sections and not section and not warned:

@@ -6,6 +6,7 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
+from enclave_launch.description.absent_modules import OpaqueValue
 from enclave_launch.description.parameters.descriptions import (
     EvaluatedParameterValue as EvaluatedParameterValue,
 )
@@ -17,6 +18,7 @@ from enclave_launch.description.substitution import (
     SomeSubstitutionsType_types_tuple,
     Substitution,
 )
+from enclave_launch.process import UnknownParameters
 
 # ruff: noqa: UP007  (aliases evaluated at run time, as upstream's are)
 
@@ -38,6 +40,9 @@ ParameterValue = Union[
     Sequence[Substitution], Sequence[Sequence[Substitution]], _Scalar, _Several, ParameterValueDescription
 ]
 ParametersDict = dict[ParameterName, ParameterValue]
-Parameters = Sequence[Union[ParameterFile, ParametersDict, ParameterDescription]]
+Parameters = Sequence[Union[ParameterFile, ParametersDict, ParameterDescription, OpaqueValue]]
 
-EvaluatedParameters = Sequence[Union[pathlib.Path, ParameterDescription, dict[str, EvaluatedParameterValue]]]
+EvaluatedParameter = Union[
+    pathlib.Path, ParameterDescription, dict[str, EvaluatedParameterValue], UnknownParameters
+]
+EvaluatedParameters = Sequence[EvaluatedParameter]

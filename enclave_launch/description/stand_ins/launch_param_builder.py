@@ -15,6 +15,8 @@ from typing import Any, Union
 from enclave_common.files import read_text
 from enclave_common.yaml_reader import load_yaml as yaml_value
 from enclave_launch.description.ament_index import get_package_share_directory
+from enclave_launch.diagnostics.evaluation import parameter_file_missing
+from enclave_launch.host.current import current_host
 from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 
 ParameterValueType = Union[  # noqa: UP007  # a value, as upstream has it: users write it in annotations
@@ -85,17 +87,21 @@ def load_file(file_path: Path) -> str | None:
 
 
 def load_yaml(file_path: Path) -> Any:
-    """Return the value of a YAML file, None if it cannot be read.
+    """Return the value of a YAML file, None if it cannot be read, no values for a file of a missing package.
 
     Raises ``ParameterBuilderFileNotFoundError``, and ``yaml.YAMLError`` as PyYAML does.
     """
+    if current_host().is_missing(str(file_path)):
+        current_host().warn(parameter_file_missing(str(file_path)))
+        return {}
     text = load_file(file_path)
     return None if text is None else yaml_value(text, MAX_BYTES)
 
 
 def load_xacro(file_path: Path, mappings: Mapping[str, str] | None = None) -> str:
     """Return the description that xacro makes of a file; raises ``ParameterBuilderFileNotFoundError``."""
-    raise_if_file_not_found(file_path)
+    if not current_host().is_missing(str(file_path)):
+        raise_if_file_not_found(file_path)
     xacro = import_module("xacro")  # the installed one, if there is one
     return str(xacro.process_file(file_path, mappings=mappings).toxml())
 

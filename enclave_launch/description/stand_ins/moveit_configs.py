@@ -116,7 +116,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         self, robot_name: str, robot_description: str = "robot_description", package_name: str | None = None
     ) -> None:
         super().__init__(package_name or f"{robot_name}_moveit_config")
-        self.__configs = MoveItConfigs(package_path=self._package_path)
+        self.__moveit_configs = MoveItConfigs(package_path=self._package_path)
         self.__robot_name = robot_name
         self.__robot_description = robot_description
         self.__urdf: Path | None = None
@@ -154,7 +154,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         assert self.__urdf is not None
         path = self.__urdf if file_path is None else self._package_path / file_path
         if not _are_texts(mappings):
-            self.__configs.robot_description = {self.__robot_description: _later(path, mappings)}
+            self.__moveit_configs.robot_description = {self.__robot_description: _later(path, mappings)}
             return self
         try:
             text = load_xacro(path, mappings=mappings or self.__urdf_arguments)
@@ -162,7 +162,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
             logging.warning("%s", error)
             logging.warning("The robot description will be loaded from /robot_description topic")
         else:
-            self.__configs.robot_description = {self.__robot_description: text}
+            self.__moveit_configs.robot_description = {self.__robot_description: text}
         return self
 
     def robot_description_semantic(
@@ -173,33 +173,35 @@ class MoveItConfigsBuilder(ParameterBuilder):
         path = self._package_path / (file_path or self.__srdf)
         name = f"{self.__robot_description}_semantic"
         value = load_xacro(path, mappings=mappings) if _are_texts(mappings) else _later(path, mappings)
-        self.__configs.robot_description_semantic = {name: value}
+        self.__moveit_configs.robot_description_semantic = {name: value}
         return self
 
     def robot_description_kinematics(self, file_path: str | None = None) -> MoveItConfigsBuilder:
         """Read the parameters of the IK solvers."""
         values = self.__yaml(file_path, "kinematics.yaml")
-        self.__configs.robot_description_kinematics = {f"{self.__robot_description}_kinematics": values}
+        self.__moveit_configs.robot_description_kinematics = {
+            f"{self.__robot_description}_kinematics": values
+        }
         return self
 
     def joint_limits(self, file_path: str | None = None) -> MoveItConfigsBuilder:
         """Read the limits of position, velocity and acceleration that replace those of the URDF."""
         values = self.__yaml(file_path, "joint_limits.yaml")
-        self.__configs.joint_limits = {f"{self.__robot_description}_planning": values}
+        self.__moveit_configs.joint_limits = {f"{self.__robot_description}_planning": values}
         return self
 
     def moveit_cpp(self, file_path: str | None = None) -> MoveItConfigsBuilder:
-        self.__configs.moveit_cpp = self.__yaml(file_path, "moveit_cpp.yaml")
+        self.__moveit_configs.moveit_cpp = self.__yaml(file_path, "moveit_cpp.yaml")
         return self
 
     def trajectory_execution(
         self, file_path: str | None = None, moveit_manage_controllers: bool = True
     ) -> MoveItConfigsBuilder:
         """Read the parameters of the controllers; without a path those of the likeliest ``*_controllers.yaml``."""
-        self.__configs.trajectory_execution = {"moveit_manage_controllers": moveit_manage_controllers}
+        self.__moveit_configs.trajectory_execution = {"moveit_manage_controllers": moveit_manage_controllers}
         path = self._package_path / file_path if file_path is not None else self.__controllers_file()
         if path is not None:
-            self.__configs.trajectory_execution.update(load_yaml(path))
+            self.__moveit_configs.trajectory_execution.update(load_yaml(path))
         return self
 
     def __controllers_file(self) -> Path | None:
@@ -228,7 +230,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         publish_robot_description: bool = False,
         publish_robot_description_semantic: bool = False,
     ) -> MoveItConfigsBuilder:
-        self.__configs.planning_scene_monitor = {
+        self.__moveit_configs.planning_scene_monitor = {
             "publish_planning_scene": publish_planning_scene,
             "publish_geometry_updates": publish_geometry_updates,
             "publish_state_updates": publish_state_updates,
@@ -244,7 +246,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         if path.exists():
             values = load_yaml(path)
             if len(values["sensors"]) > 0 and values["sensors"][0]:
-                self.__configs.sensors_3d = values
+                self.__moveit_configs.sensors_3d = values
         return self
 
     def planning_pipelines(
@@ -277,7 +279,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
             values[name] = defaults[name] if name in defaults and not path.exists() else load_yaml(path)
         if "ompl" in values and "planner_configs" not in values["ompl"]:
             values["ompl"].update(ompl_planner_configs())
-        self.__configs.planning_pipelines = values
+        self.__moveit_configs.planning_pipelines = values
         return self
 
     def pilz_cartesian_limits(self, file_path: str | None = None) -> MoveItConfigsBuilder:
@@ -286,7 +288,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
                 "cartesian_limits.yaml is deprecated, please rename to pilz_cartesian_limits.yaml"
             )
         values = self.__yaml(file_path, "pilz_cartesian_limits.yaml")
-        self.__configs.pilz_cartesian_limits = {f"{self.__robot_description}_planning": values}
+        self.__moveit_configs.pilz_cartesian_limits = {f"{self.__robot_description}_planning": values}
         return self
 
     def __yaml(self, file_path: str | None, usual: str) -> Any:
@@ -294,7 +296,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
 
     def to_moveit_configs(self) -> MoveItConfigs:
         """Return the parameters, after reading from their usual places what was not read yet."""
-        configs = self.__configs
+        configs = self.__moveit_configs
         for is_read, read in (
             (configs.robot_description, self.robot_description),
             (configs.robot_description_semantic, self.robot_description_semantic),
