@@ -1,22 +1,5 @@
 """The public names of keystore for type checkers."""
 
-from enclave_addons.deployment.fleet import FleetReport as FleetReport
-from enclave_addons.deployment.fleet import fleet_status as fleet_status
-from enclave_addons.deployment.host_bundles import BundleOptions as BundleOptions
-from enclave_addons.deployment.host_bundles import HostBundle as HostBundle
-from enclave_addons.deployment.host_bundles import export_hosts as export_hosts
-from enclave_addons.deployment.host_bundles import pinned as pinned
-from enclave_addons.deployment.host_keys import RequestOptions as RequestOptions
-from enclave_addons.deployment.host_keys import request as request
-from enclave_addons.deployment.hosts import Hosts as Hosts
-from enclave_addons.deployment.hosts import load_hosts as load_hosts
-from enclave_addons.deployment.importing import ImportOptions as ImportOptions
-from enclave_addons.deployment.importing import ImportReport as ImportReport
-from enclave_addons.deployment.importing import import_bundle as import_bundle
-from enclave_addons.deployment.public_files import PublicFiles as PublicFiles
-from enclave_addons.deployment.public_files import export as export
-from enclave_addons.deployment.request_signing import accept_certificates as accept_certificates
-from enclave_addons.deployment.request_signing import sign_requests as sign_requests
 from keystore.disk.share_files import LaunchHold as LaunchHold
 from keystore.errors import DamagedKeystoreError as DamagedKeystoreError
 from keystore.errors import InvalidEnclaveNameError as InvalidEnclaveNameError

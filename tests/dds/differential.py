@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from enclave_addons.deployment import export
 from keystore import (
     CaAccess,
     DomainRule,
@@ -21,7 +22,6 @@ from keystore import (
     Role,
     Severity,
     TopicRule,
-    export,
     verify,
 )
 from keystore.disk.view import KeystoreView

@@ -14,17 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment import ImportOptions, export_hosts, import_bundle, pinned, sign_requests
 from enclave_addons.deployment.host_keys import parse_requests
-from keystore import (
-    EnclavePolicy,
-    ImportOptions,
-    Operation,
-    ProvisionOptions,
-    export_hosts,
-    import_bundle,
-    pinned,
-    sign_requests,
-)
+from keystore import EnclavePolicy, Operation, ProvisionOptions
 from tests.dds.conftest import missing
 from tests.dds.our_keystore import allow, node, provision
 from tests.dds.probe import Participant, Probe

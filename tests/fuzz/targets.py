@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import yaml
 
+from enclave_addons.deployment import request
 from enclave_addons.deployment.bundle_file import bundle_bytes, sealed_bundle
 from enclave_addons.deployment.host_keys import parse_requests, requests_text
 from enclave_addons.deployment.hosts import parse_hosts
@@ -24,7 +25,7 @@ from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.markup.xml import parse_launch_xml as parse_launch_xml
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
-from keystore import Domains, KeystoreError, request
+from keystore import Domains, KeystoreError
 from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
 from keystore.formats.enclave_name import validate_enclave_name

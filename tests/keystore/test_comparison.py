@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment import export
 from keystore import (
     DamagedKeystoreError,
     Domains,
@@ -29,7 +30,6 @@ from keystore import (
     UnsafeKeystoreError,
     apply_policy,
     create_enclaves,
-    export,
     provision,
     remove,
     roll_over,

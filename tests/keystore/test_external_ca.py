@@ -8,22 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from enclave_addons.deployment.host_keys import Request, parse_requests, requests_text
-from keystore import (
+from enclave_addons.deployment import (
     BundleOptions,
     ImportOptions,
-    InvalidInputError,
-    Role,
-    Severity,
-    SigningUnavailableError,
     accept_certificates,
     export_hosts,
     import_bundle,
     pinned,
-    provision,
     request,
-    verify,
 )
+from enclave_addons.deployment.host_keys import Request, parse_requests, requests_text
+from keystore import InvalidInputError, Role, Severity, SigningUnavailableError, provision, verify
 from keystore.disk.view import KeystoreView
 from keystore.verb import main
 from tests.keystore.kit import actions, openssl, options, policy

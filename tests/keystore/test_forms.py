@@ -17,6 +17,7 @@ from cryptography.hazmat.primitives import serialization
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from enclave_addons.deployment import export, export_hosts
 from keystore import (
     CaAccess,
     DamagedKeystoreError,
@@ -27,8 +28,6 @@ from keystore import (
     RemoveOptions,
     RenewOptions,
     Role,
-    export,
-    export_hosts,
     provision,
     remove,
     renew,

@@ -18,19 +18,18 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from enclave_addons.deployment import PublicFiles, export
 from keystore import (
     CaAccess,
     DomainRule,
     Domains,
     Governance,
     Protection,
-    PublicFiles,
     RemoveOptions,
     Requirements,
     Role,
     Severity,
     TopicRule,
-    export,
     remove,
     verify,
 )

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore import Policy, apply_policy, create_enclaves, export, provision
+from enclave_addons.deployment import export
+from keystore import Policy, apply_policy, create_enclaves, provision
 from keystore.disk import layout
 from keystore.formats.certificate import read_certificate
 from keystore.formats.domains import Domains

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment import request
 from enclave_addons.deployment.host_keys import Request, requests_text
-from keystore import Role, Severity, request, verify
+from keystore import Role, Severity, verify
 from keystore.disk import layout
 from keystore.formats.certificate import CertificateFacts, given_certificates
 from keystore.signing.openssl import refusals

@@ -12,26 +12,28 @@ import pytest
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
 
+from enclave_addons.deployment import (
+    ImportOptions,
+    RequestOptions,
+    export_hosts,
+    import_bundle,
+    pinned,
+    request,
+    sign_requests,
+)
 from keystore import (
     CaAccess,
     ImportedCa,
-    ImportOptions,
     InvalidInputError,
     RemoveOptions,
     RenewOptions,
-    RequestOptions,
     Role,
     Secret,
     SigningUnavailableError,
     Validity,
-    export_hosts,
-    import_bundle,
-    pinned,
     provision,
     remove,
     renew,
-    request,
-    sign_requests,
     verify,
 )
 from keystore.formats.validity import utc_now

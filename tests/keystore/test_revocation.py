@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
+from enclave_addons.deployment import export
 from keystore import (
     DamagedKeystoreError,
     InvalidInputError,
     RemoveOptions,
     RenewOptions,
-    export,
     list_enclaves,
     provision,
     remove,

@@ -16,18 +16,8 @@ from typing import Any
 
 import pytest
 
-from keystore import (
-    CaAccess,
-    ImportedCa,
-    RequestOptions,
-    Role,
-    Secret,
-    Step,
-    StorageError,
-    UnsafeKeystoreError,
-    request,
-    roll_over,
-)
+from enclave_addons.deployment import RequestOptions, request
+from keystore import CaAccess, ImportedCa, Role, Secret, Step, StorageError, UnsafeKeystoreError, roll_over
 from keystore.disk import layout, store
 from keystore.disk.store import Content, Link, Store, write_new
 from keystore.disk.versions import Versions, make_directories

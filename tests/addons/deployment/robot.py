@@ -8,8 +8,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from enclave_addons.deployment import BundleOptions, HostBundle, export_hosts, load_hosts, pinned
 from enclave_addons.deployment.host_bundles import enclaves_of_hosts
-from keystore import BundleOptions, HostBundle, export_hosts, list_enclaves, load_hosts, pinned
+from keystore import list_enclaves
 from tests.addons.deployment.booted import Machine
 from tests.addons.deployment.kit import export, launch_file, provisioned, set_up_ros
 from tests.addons.deployment.networks import LOOPBACK, Network

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore import RemoveOptions, RenewOptions, Role, Step, pinned, remove, renew, roll_over
+from enclave_addons.deployment import pinned
+from keystore import RemoveOptions, RenewOptions, Role, Step, remove, renew, roll_over
 from tests.addons.deployment.booted import booted
 from tests.addons.deployment.robot import KS, Host, node, robot, until, up
 from tests.keystore.kit import options

@@ -10,16 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore import (
-    DamagedKeystoreError,
-    InvalidInputError,
-    PublicFiles,
-    RemoveOptions,
-    Role,
-    export,
-    remove,
-    verify,
-)
+from enclave_addons.deployment import PublicFiles, export
+from keystore import DamagedKeystoreError, InvalidInputError, RemoveOptions, Role, remove, verify
 from keystore.disk import layout
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, contents, filled, mode, openssl

@@ -9,23 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from keystore import (
+from enclave_addons.deployment import (
     BundleOptions,
     HostBundle,
     ImportOptions,
-    InvalidInputError,
-    RemoveOptions,
-    RenewOptions,
-    Role,
-    Step,
     export_hosts,
     fleet_status,
     import_bundle,
     pinned,
-    remove,
-    renew,
-    roll_over,
 )
+from keystore import InvalidInputError, RemoveOptions, RenewOptions, Role, Step, remove, renew, roll_over
 from keystore.formats.validity import utc_now
 from keystore.verb import main
 from tests.keystore.kit import DAY, filled, options

@@ -14,18 +14,15 @@ from typing import Any
 import pytest
 import yaml
 
-from keystore import (
+from enclave_addons.deployment import (
     ImportOptions,
-    RemoveOptions,
-    RenewOptions,
     export_hosts,
     import_bundle,
     pinned,
-    remove,
-    renew,
     request,
     sign_requests,
 )
+from keystore import RemoveOptions, RenewOptions, remove, renew
 from keystore.disk import layout
 from tests.addons.deployment.kit import (
     DEMO_WS,

@@ -11,16 +11,21 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
+from enclave_addons.deployment import (
+    BundleOptions,
+    HostBundle,
+    ImportOptions,
+    ImportReport,
+    export_hosts,
+    import_bundle,
+    pinned,
+)
 from enclave_addons.deployment.bundle_file import bundle_bytes
 from enclave_addons.deployment.host_bundles import enclaves_of_hosts
 from enclave_addons.deployment.hosts import parse_hosts
 from enclave_addons.deployment.importing import Restart
 from keystore import (
-    BundleOptions,
     DamagedKeystoreError,
-    HostBundle,
-    ImportOptions,
-    ImportReport,
     InvalidInputError,
     KeystoreError,
     NotAKeystoreError,
@@ -29,9 +34,6 @@ from keystore import (
     Role,
     Step,
     UnsafeKeystoreError,
-    export_hosts,
-    import_bundle,
-    pinned,
     provision,
     remove,
     renew,

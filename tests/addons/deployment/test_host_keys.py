@@ -7,26 +7,28 @@ from pathlib import Path
 
 import pytest
 
-from enclave_addons.deployment.host_keys import parse_requests, requests_text
-from keystore import (
+from enclave_addons.deployment import (
     BundleOptions,
-    DamagedKeystoreError,
     HostBundle,
     ImportOptions,
     ImportReport,
-    InvalidInputError,
-    RemoveOptions,
-    RenewOptions,
-    UnsafeKeystoreError,
     export,
     export_hosts,
     import_bundle,
     pinned,
+    request,
+    sign_requests,
+)
+from enclave_addons.deployment.host_keys import parse_requests, requests_text
+from keystore import (
+    DamagedKeystoreError,
+    InvalidInputError,
+    RemoveOptions,
+    RenewOptions,
+    UnsafeKeystoreError,
     provision,
     remove,
     renew,
-    request,
-    sign_requests,
     verify,
 )
 from keystore.disk import layout

@@ -9,26 +9,28 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment import (
+    BundleOptions,
+    HostBundle,
+    ImportOptions,
+    export_hosts,
+    fleet_status,
+    import_bundle,
+    pinned,
+)
 from enclave_addons.deployment.bundle_file import sealed_bundle
 from enclave_addons.deployment.importing import Restart
 from keystore import (
-    BundleOptions,
     ChangeOptions,
     DamagedKeystoreError,
     DomainRule,
     Governance,
-    HostBundle,
-    ImportOptions,
     KeystoreError,
     Protection,
     RemoveOptions,
     Role,
     Step,
     UnsafeKeystoreError,
-    export_hosts,
-    fleet_status,
-    import_bundle,
-    pinned,
     provision,
     remove,
     roll_over,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment import export_hosts, load_hosts
 from enclave_addons.deployment.placement import restart_order
 from enclave_addons.deployment.processes import engine_names, label
-from keystore import export_hosts, load_hosts
 from keystore.verb import main as secure_keystore
 from tests.addons.deployment.kit import TALK, export, launch_file, provisioned, secure_plan
 

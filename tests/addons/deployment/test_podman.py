@@ -17,7 +17,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from keystore import BundleOptions, RenewOptions, export_hosts, pinned, renew
+from enclave_addons.deployment import BundleOptions, export_hosts, pinned
+from keystore import RenewOptions, renew
 from tests.addons.deployment.booted import Machine, booted, repository_folders
 from tests.addons.deployment.kit import export, launch_file, provisioned, tool
 from tests.addons.deployment.robot import HEARD, until

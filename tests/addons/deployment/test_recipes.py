@@ -10,18 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from keystore import (
+from enclave_addons.deployment import (
     BundleOptions,
     ImportOptions,
-    Policy,
-    RenewOptions,
     export_hosts,
     import_bundle,
     pinned,
-    renew,
     request,
-    verify,
 )
+from keystore import Policy, RenewOptions, renew, verify
 from keystore.formats.policy_xml import policy_xml
 from tests.addons.deployment.kit import TALK, made, tool
 from tests.keystore.kit import filled, openssl, options, policy

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import BundleOptions, ImportOptions, export_hosts, import_bundle, pinned
+from enclave_addons.deployment import BundleOptions, ImportOptions, export_hosts, import_bundle, pinned
 from keystore.verb import main
 from tests.keystore.kit import filled
 

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 
-from keystore import ImportOptions, export_hosts, import_bundle, load_hosts, pinned
+from enclave_addons.deployment import ImportOptions, export_hosts, import_bundle, load_hosts, pinned
 from tests.addons.deployment.kit import export, launch_file, provisioned, secure_plan, set_up_ros
 from tests.addons.deployment.networks import Network, two_networks
 from tests.addons.deployment.systemd_stand_in import StandIn, Unit

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment import export
 from enclave_addons.zenoh.configuration import RouterAddress
 from enclave_addons.zenoh.writing import matching_enclaves, write_zenoh
 from keystore import (
@@ -17,7 +18,6 @@ from keystore import (
     RenewOptions,
     Step,
     drop_shares,
-    export,
     provision,
     renew,
     roll_over,
