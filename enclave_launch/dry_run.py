@@ -28,7 +28,7 @@ def _described(description: str) -> Any:
     return Field(..., description=description)
 
 
-_ORIGIN = "where they come from: --nodl, manifest of the package, recorded, inferred, library"
+_ORIGIN = "where they come from: --nodl, manifest of the package, recorded, inferred, library, policy"
 
 
 class _Strict(BaseModel, extra="forbid", frozen=True):

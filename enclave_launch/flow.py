@@ -160,7 +160,8 @@ def provision(
     if plan.problems:
         raise ManifestError(refusal(plan.problems))
     chosen = options or SecurityOptions()
-    settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
+    logs = os.path.abspath(chosen.log_folder) if chosen.log_folder else ""
+    settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy, logs)
     return provision_plan(plan, settings, chosen.keystore or ProvisionOptions())
 
 

@@ -19,7 +19,7 @@ from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.policy.node_permissions import ALSO
 from keystore.errors import KeystoreError
-from keystore.formats.policy_xml import read_policy
+from keystore.formats.policy_xml import read_policies
 from keystore.steps.options import ProvisionOptions
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class ResolveOptions:
     def plan_options(self) -> PlanOptions:
         """Return the options of planning; raises ``UsageError`` for a policy file that cannot be used."""
         with translated(KeystoreError, UsageError):
-            document = read_policy(self.policy) if self.policy else None
+            document = read_policies(self.policy) if self.policy else None
         if unknown := [name for name in self.also if name not in ALSO]:
             raise UsageError(f"--also {unknown[0]}: choose from {', '.join(ALSO)}")
         policy = PolicyOptions(self.accept_patterns, document, also=frozenset(self.also))
@@ -90,10 +90,12 @@ def _several(given: Any) -> tuple[Any, ...]:
 @dataclass(frozen=True, slots=True)
 class SecurityOptions:
     """Options of ``provision``: the keystore's own (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
-    the strategy of the processes (``ROS_SECURITY_STRATEGY``)."""
+    the strategy of the processes (``ROS_SECURITY_STRATEGY``). ``log_folder``: where processes on Fast DDS write their
+    security logs."""
 
     strategy: str = "Enforce"
     keystore: ProvisionOptions | None = None
+    log_folder: Path | None = None
 
 
 class Deadline:

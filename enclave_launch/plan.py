@@ -36,6 +36,7 @@ class InterfaceOrigin(str, Enum):
     RECORDED = "recorded"
     ANALYSIS = "inferred"
     LIBRARY = "library"
+    POLICY = "policy"
 
 
 Named = tuple[Operation, str]

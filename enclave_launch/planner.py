@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
 
 import enclave_launch.plan_diagnostics as plan_diagnostics
+from enclave_common.words import some_of
 from enclave_launch.admission import AdmissionOptions, notes, prefix_refusals, refusals
 from enclave_launch.admission.middleware import middleware_of
 from enclave_launch.admission.variables import domain_of
@@ -13,6 +16,7 @@ from enclave_launch.diagnostics.evaluation import not_foreseeable
 from enclave_launch.enclave import EnclaveScope, assign_enclave
 from enclave_launch.plan import (
     InterfaceLookup,
+    InterfaceOrigin,
     LaunchPlan,
     Missing,
     PlanInputs,
@@ -22,9 +26,18 @@ from enclave_launch.plan import (
 )
 from enclave_launch.policy import derive_policy
 from enclave_launch.policy.launcher import launcher_node
-from enclave_launch.policy.running_node import Role, UnknownNodeName, node_of_component, node_of_process
+from enclave_launch.policy.running_node import (
+    Role,
+    RunningNode,
+    UnknownNodeName,
+    node_of_component,
+    node_of_process,
+)
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
-from nodl.node_interface import RANDOM_ENDING
+from keystore.formats.permissions_patterns import has_wildcard
+from keystore.formats.policy_xml import PolicyDocument
+from nodl.node_interface import RANDOM_ENDING, NodeInterface
+from nodl.source_ref import SourceRef
 
 
 def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
@@ -39,6 +52,11 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
     )
     containers = _containers(processes)
     components = tuple(_plan_component(item, containers, inputs.lookup) for item in evaluation.components)
+    if options.policy.policy_file is not None:
+        profiles = _Profiles(options.policy.policy_file)
+        profiles.take(nodes_of(processes, components, None))
+        processes = tuple(map(profiles.described_process, profiles.named_first(processes)))
+        components = tuple(map(profiles.described_component, components))
     launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
     derived = derive_policy(
         nodes_of(processes, components, launcher),
@@ -103,6 +121,103 @@ def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: Encl
         return PlannedProcess(process, enclave, (), missing)
     return PlannedProcess(
         process, enclave, nodes, origin=found.origin, doubt=found.doubt, descriptions=found.descriptions
+    )
+
+
+class _Profiles:
+    """Profiles of a policy file, as descriptions of the nodes of which nothing else is known.
+
+    A profile is of the node of its name, as launch names it. Where launch gives no name, the profiles that are no
+    other node's are those of the one program in their enclave that has no description.
+    """
+
+    def __init__(self, document: PolicyDocument) -> None:
+        self._document = document
+        self._left = {
+            enclave.path: {(profile.ns, profile.node): profile for profile in enclave.profiles}
+            for enclave in document.policy.enclaves
+        }
+        self._unnamed: Counter[str] = Counter()
+
+    def take(self, nodes: Iterable[RunningNode]) -> None:
+        """Take the profiles of nodes that are described already: they are of no other program."""
+        for node in nodes:
+            self._left.get(node.enclave, {}).pop((node.namespace, node.fixed_name), None)
+
+    def named_first(self, processes: tuple[PlannedProcess, ...]) -> tuple[PlannedProcess, ...]:
+        """Describe the processes that launch names; the rest is described by what is left."""
+        named = tuple(
+            item if item.process.name == UNSPECIFIED_NODE_NAME else self.described_process(item)
+            for item in processes
+        )
+        self._unnamed.update(item.enclave.path for item in named if item.missing and item.enclave)
+        return named
+
+    def described_process(self, item: PlannedProcess) -> PlannedProcess:
+        """Return the process with the nodes that the policy describes."""
+        process = item.process
+        if item.missing is None or item.enclave is None or process.kind == "executable":
+            return item
+        path, role = item.enclave.path, _role(process)
+        unnamed = process.name == UNSPECIFIED_NODE_NAME
+        nodes = tuple(
+            node
+            for interface in self._interfaces(path, process.package, process.executable, None)
+            if _is_its_own(node := node_of_process(process, interface, path, role), interface)
+        )
+        if not nodes or (unnamed and self._unnamed[path] > 1):
+            return item._replace(missing=self._still_missing(item.missing, path))
+        self.take(nodes)
+        return item._replace(nodes=nodes, missing=None, origin=InterfaceOrigin.POLICY)
+
+    def described_component(self, item: PlannedComponent) -> PlannedComponent:
+        """Return the component with the node that the policy describes."""
+        container = item.container
+        if item.missing is None or container is None or container.enclave is None:
+            return item
+        path, component = container.enclave.path, item.component
+        nodes = tuple(
+            node
+            for interface in self._interfaces(path, component.package, None, component.plugin)
+            if _is_its_own(
+                node := node_of_component(component, container.process, interface, path), interface
+            )
+        )
+        if len(nodes) != 1:
+            return item._replace(missing=self._still_missing(item.missing, path))
+        self.take(nodes)
+        return item._replace(nodes=nodes, missing=None, origin=InterfaceOrigin.POLICY)
+
+    def _interfaces(
+        self, path: str, package: str | None, executable: str | None, plugin: str | None
+    ) -> Iterator[NodeInterface]:
+        for (ns, node), profile in self._left.get(path, {}).items():
+            place = SourceRef(self._document.file)
+            if profile.rules:
+                file, _, line = self._document.places[path, ns, node, profile.rules[0]].rpartition(":")
+                place = SourceRef(file, int(line) if line.isdecimal() else 0)
+            yield NodeInterface(package, executable, plugin, node, ns, (), place)
+
+    def _still_missing(self, missing: Missing, path: str) -> Missing:
+        """Return ``missing`` with what the policy has instead."""
+        left = [f"{ns.rstrip('/')}/{node}" for ns, node in self._left.get(path, {})]
+        elsewhere = sorted(each for each, profiles in self._left.items() if profiles and each != path)
+        if left:
+            why = f"the policy has profiles of {some_of(left, 3)} in enclave {path}, of which none is surely this node"
+        elif elsewhere:
+            why = f"the policy has no profile for it in enclave {path}, but some in {some_of(elsewhere, 3)} (enclave=)"
+        else:
+            why = f"the policy has no profile for it in enclave {path}"
+        return missing._replace(why=f"{why}; {missing.why}")
+
+
+def _is_its_own(node: RunningNode, interface: NodeInterface) -> bool:
+    """Return whether a profile is of this node: launch gives it no other name or namespace."""
+    written = (interface.namespace, interface.name)
+    return written == (node.namespace, node.name) or (
+        written[0] == node.namespace
+        and has_wildcard(written[1] or "")
+        and fnmatchcase(node.name, written[1] or "")
     )
 
 

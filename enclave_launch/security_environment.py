@@ -9,9 +9,9 @@ rcl stay, so that it ends without its enclave, and is secured should it load a D
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.admission.middleware import ZENOH, Vendor, vendor_of
 from enclave_launch.admission.variables import ZENOH_CLEARED, ZENOH_SESSION
 from enclave_launch.enclave import AssignmentReason
 from enclave_launch.plan import PlannedProcess
@@ -21,16 +21,19 @@ ENABLE = "ROS_SECURITY_ENABLE"
 KEYSTORE = "ROS_SECURITY_KEYSTORE"
 STRATEGY = "ROS_SECURITY_STRATEGY"
 OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+LOG_FILE, LOG_VERBOSITY = "ROS_SECURITY_LOG_FILE", "ROS_SECURITY_LOG_VERBOSITY"
 NO_KEYSTORE = "/dev/null/an_executable_without_an_enclave"
 """Below a file, so that nothing can ever be there."""
 
 
-class SecuritySettings(NamedTuple):
+@dataclass(frozen=True)
+class SecuritySettings:
     """The settings of secured processes. ``keystore``: absolute path of the keystore's root (rcl appends ``enclaves``
-    itself)."""
+    itself). ``log_folder``: absolute path of a folder for the security logs of Fast DDS, a file for each process."""
 
     keystore: str
     strategy: str = "Enforce"
+    log_folder: str = ""
 
 
 def enclave_arguments(planned: PlannedProcess) -> tuple[str, ...]:
@@ -58,7 +61,21 @@ def secured_environment(planned: PlannedProcess, settings: SecuritySettings | No
         return {**nowhere, ZENOH_SESSION: NO_KEYSTORE} if planned.middleware == ZENOH else nowhere
     path, process = planned.enclave.path, planned.process
     override = {OVERRIDE: path} if process.kind == "executable" else {}
-    return {**enclave_environment(path, planned.middleware, settings), **override}
+    log = _security_log(planned, settings.log_folder)
+    return {**enclave_environment(path, planned.middleware, settings), **override, **log}
+
+
+def _security_log(planned: PlannedProcess, folder: str) -> Mapping[str, str]:
+    """Return what switches the security log on (rmw_fastrtps_shared_cpp utils.cpp; no other middleware has one).
+
+    A log that the launch file sets up for the process stays as it is.
+    """
+    process = planned.process
+    if not folder or vendor_of(planned.middleware) is not Vendor.FAST or LOG_FILE in process.environment:
+        return {}
+    verbosity = process.environment.get(LOG_VERBOSITY, "WARNING")
+    name = process.process_name.replace("/", "_")
+    return {LOG_FILE: f"{folder}/{name}.log", LOG_VERBOSITY: verbosity}
 
 
 def enclave_environment(enclave: str, middleware: str, settings: SecuritySettings) -> Mapping[str, str]:

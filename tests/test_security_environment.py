@@ -60,3 +60,16 @@ def test_what_each_kind_of_process_is_told(strategy: str) -> None:
     assert nowhere["ROS_SECURITY_ENABLE"] == "true" and nowhere["ROS_SECURITY_STRATEGY"] == "Enforce"
     assert not Path(nowhere["ROS_SECURITY_KEYSTORE"]).parent.is_dir(), "nothing can ever be there"
     assert secured_environment(planned("node", "/a"), None) == {}
+
+
+def test_the_security_log_is_switched_on_where_the_middleware_has_one() -> None:
+    settings = SecuritySettings("/ks", log_folder="/logs")
+    log = {"ROS_SECURITY_LOG_FILE": "/logs/x-1.log", "ROS_SECURITY_LOG_VERBOSITY": "WARNING"}
+    on_fast = planned("node", "/a")._replace(middleware="rmw_fastrtps_cpp")
+    assert log.items() <= secured_environment(on_fast, settings).items()
+    assert not log.keys() & secured_environment(on_fast, SecuritySettings("/ks")).keys()
+    on_cyclone = on_fast._replace(middleware="rmw_cyclonedds_cpp")
+    assert not log.keys() & secured_environment(on_cyclone, settings).keys()
+    own = {"ROS_SECURITY_LOG_FILE": "mine.log"}
+    kept = on_fast._replace(process=on_fast.process._replace(environment=own))
+    assert not log.keys() & secured_environment(kept, settings).keys(), "the launch file's own stays"

@@ -19,6 +19,7 @@ from enclave_addons.recording.record.lines import EndpointMade, Initialised, Lin
 from enclave_addons.recording.record.requested import REFUSED, EndpointRole, RequestedEndpoint, role_of
 from enclave_addons.recording.recording import Listener, Recording
 from enclave_addons.recording.remedies import Patch, Remedies
+from enclave_common.files import text_or_nothing
 from enclave_common.terminal import printable
 from enclave_common.words import some_of
 from enclave_launch.admission.middleware import ZENOH
@@ -147,6 +148,12 @@ class Explainer(Listener):
             kept = self._printed.setdefault(event.name, deque(maxlen=_LAST_LINES))
             kept.extend(event.data.decode(errors="replace").splitlines())
 
+    def _said(self, process: str) -> list[str]:
+        """Return the last lines of a process: of its security log, if it writes one, and of its output."""
+        log = self._recording.security_logs.get(process)
+        written = text_or_nothing(log).splitlines()[-_LAST_LINES:] if log is not None else []
+        return [*written, *self._printed.get(process, ())]
+
     def record_read(self) -> None:
         self._report_waiting(time.monotonic())
 
@@ -176,7 +183,7 @@ class Explainer(Listener):
             return
         self._explained_already.add(need)
         patch = None if granted else self._remedies.patch(need, endpoint, described)
-        cause = cause_of((*endpoint.error, *self._printed.get(name, ()))) if granted else None
+        cause = cause_of((*endpoint.error, *self._said(name))) if granted else None
         unseen = () if granted else self._remedies.unseen(need, described)
         denied = self._grants.denied(need)
         self._report(Denial(name, need, endpoint, described, granted, patch, cause, silent, unseen, denied))
@@ -186,7 +193,7 @@ class Explainer(Listener):
         self._waiting = [each for each in self._waiting if each[0] > now]
         for _, process, node, error in due:
             name = _name(process)
-            cause = cause_of((*error, *reversed(self._printed.get(name, ()))))
+            cause = cause_of((*error, *reversed(self._said(name))))
             self._report(NotJoined(name, node, self._grants.enclave_of(process) or "none", cause, error))
 
     def _report(self, what: Denial | NotJoined) -> None:

@@ -50,6 +50,7 @@ from enclave_launch.runtime.run_events import (
     ProcessStarted,
     RunEvent,
 )
+from enclave_launch.security_environment import LOG_FILE
 from nodl.ros_arguments import parse_ros_arguments
 
 INTERVAL = 0.1
@@ -103,6 +104,7 @@ class Recording:
         self.unrecorded: list[Unrecorded] = []
         self.running: dict[int, float] = {}  # pid -> when it was started
         self.unheard: set[int] = set()  # pids of which nothing is to be expected
+        self.security_logs: dict[str, Path] = {}  # of the processes that write one
         self.data = b""
         self._listeners: tuple[Listener, ...] = (EndpointEvents(), *listeners)
         self._optional = optional
@@ -151,6 +153,8 @@ class Recording:
 
     def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
         self._processes[process.process_name] = process
+        if log := spec.environment.get(LOG_FILE):
+            self.security_logs[process.process_name] = Path(spec.cwd or ".") / log
         if self._folder is None:
             return spec
         program = inspect_command(spec.cmd, spec.environment.get("PATH", os.defpath))

@@ -7,7 +7,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.admission.middleware import VARIABLE, ZENOH, Vendor, middleware_of, vendor_of, why_not
-from enclave_launch.admission.variables import domain_of, foreign_configurations, overridden, preloaded
+from enclave_launch.admission.variables import (
+    discovery_is_off,
+    domain_of,
+    foreign_configurations,
+    overridden,
+    preloaded,
+)
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics import enclaves as diagnostics
 from enclave_launch.errors import UsageError
@@ -44,8 +50,10 @@ def refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iterator[Di
         domain_of(process.final_environment)
     except UsageError as error:
         yield diagnostics.domain_invalid(name, str(error), place)
-    for found in foreign_configurations(process.final_environment, Path(process.cwd or ".").absolute()):
-        yield diagnostics.security_configured(name, found.variable, found.value, found.why, place)
+    cwd, on_fast = Path(process.cwd or ".").absolute(), vendor_of(middleware) is Vendor.FAST
+    for found in foreign_configurations(process.final_environment, cwd, on_fast=on_fast):
+        report = diagnostics.discovery_server if found.is_discovery else diagnostics.security_configured
+        yield report(name, found.variable, found.value, found.why, place)
 
 
 def notes(process: ResolvedProcess) -> Iterator[Diagnostic]:
@@ -56,6 +64,8 @@ def notes(process: ResolvedProcess) -> Iterator[Diagnostic]:
         yield diagnostics.variable_overridden(name, setting.variable, setting.value, place)
     for setting in preloaded(process.environment):
         yield diagnostics.library_preloaded(name, setting.variable, setting.value, place)
+    if discovery_is_off(process.final_environment):
+        yield diagnostics.discovery_off(name, place)
     if vendor_of(middleware) is Vendor.CONNEXT:
         yield diagnostics.connext(name, place)
 

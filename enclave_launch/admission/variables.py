@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,12 +44,15 @@ _CONFIGURATIONS = (
 )
 _ENVIRONMENT_FILE = "FASTDDS_ENVIRONMENT_FILE"
 _DEFAULT_PROFILES, _SKIP_DEFAULT = "DEFAULT_FASTRTPS_PROFILES.xml", "SKIP_DEFAULT_XML_FILE"
-_DISCOVERY_SERVER = re.compile(
+_DISCOVERY_SERVER = "ROS_DISCOVERY_SERVER"
+_NAMES_SERVER = re.compile(
     r"ROS_DISCOVERY_SERVER|discoveryServersList|<\s*discoveryProtocol\s*>\s*(?:SUPER_)?(?:CLIENT|SERVER|BACKUP)"
 )
+_NO_DISCOVERY = re.compile(r"<\s*discoveryProtocol\s*>\s*(NONE|STATIC)\b")
 _SECURITY = re.compile(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
 _REFERENCE = re.compile(r"\$\{(\w+)(?::-([^}]*))?\}")
 """As Cyclone DDS takes parts of a document from the environment."""
+_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _PRELOAD = ("LD_PRELOAD", "LD_AUDIT")
 
 
@@ -73,31 +77,38 @@ def preloaded(environment: Mapping[str, str]) -> Iterator[Setting]:
             yield Setting(name, environment[name])
 
 
-class Foreign(NamedTuple):
-    """A configuration of a DDS that a secured process must not have, and why."""
+@dataclass(frozen=True)
+class Foreign:
+    """A configuration of a DDS that a secured process must not have, and why.
+
+    ``is_discovery``: it silences the process, or leads past its enclave, by the way in which it finds others.
+    """
 
     variable: str
     value: str
     why: str
+    is_discovery: bool = False
 
 
-def foreign_configurations(environment: Mapping[str, str], cwd: Path) -> Iterator[Foreign]:
+def foreign_configurations(environment: Mapping[str, str], cwd: Path, *, on_fast: bool) -> Iterator[Foreign]:
     """Find configurations with security settings, with a discovery server, or that cannot be read; reads the files as
     the middleware does, relative ones from ``cwd``.
 
-    A discovery server is the one known way past an enclave: with it there is no handshake.
+    A discovery server is the one known way past an enclave: with it there is no handshake. ``on_fast``: the process
+    runs on Fast DDS, the only one that reads ``ROS_DISCOVERY_SERVER``.
     """
+    if on_fast and environment.get(_DISCOVERY_SERVER):
+        yield Foreign(_DISCOVERY_SERVER, environment[_DISCOVERY_SERVER], _SERVER, is_discovery=True)
     for name in _CONFIGURATIONS:
         for part in _parts(environment.get(name, "")):
             text = part if "<" in part else text_or_nothing(cwd / part.removeprefix("file://"))
-            if why := _objection(text, environment):
-                yield Foreign(name, part, why)
+            yield from _judged(name, part, text, environment)
     others = {_ENVIRONMENT_FILE: environment.get(_ENVIRONMENT_FILE), _DEFAULT_PROFILES: None}
     if environment.get(_SKIP_DEFAULT) != "1" and (cwd / _DEFAULT_PROFILES).exists():
         others[_DEFAULT_PROFILES] = _DEFAULT_PROFILES
     for name, file in others.items():
-        if file and (why := _objection(text_or_nothing(cwd / file), environment)):
-            yield Foreign(name, str(cwd / file), why)
+        if file:
+            yield from _judged(name, str(cwd / file), text_or_nothing(cwd / file), environment)
 
 
 def _parts(value: str) -> Iterator[str]:
@@ -109,15 +120,28 @@ def _parts(value: str) -> Iterator[str]:
     yield from filter(None, (documents, *map(str.strip, files)))
 
 
-def _objection(text: str, environment: Mapping[str, str]) -> str | None:
+_SERVER = "names a discovery server of Fast DDS, through which secured processes never meet"
+
+
+def _judged(variable: str, value: str, text: str, environment: Mapping[str, str]) -> Iterator[Foreign]:
+    """Report the first thing in ``text`` that a secured process must not have."""
     if not text.strip():
-        return "cannot be read, so nobody knows what is in it"
+        yield Foreign(variable, value, "cannot be read, so nobody knows what is in it")
+        return
     written = _REFERENCE.sub(lambda found: environment.get(found[1]) or found[2] or "", text)
     if _SECURITY.search(written):
-        return "has security settings of its own, beside those of its enclave"
-    if _DISCOVERY_SERVER.search(written):
-        return "names a discovery server, with which Fast DDS makes no handshake"
-    return None
+        yield Foreign(variable, value, "has security settings of its own, beside those of its enclave")
+    elif _NAMES_SERVER.search(written):
+        yield Foreign(variable, value, _SERVER, is_discovery=True)
+    elif found := _NO_DISCOVERY.search(written):
+        yield Foreign(
+            variable, value, f"has discoveryProtocol {found[1]}: it meets nobody", is_discovery=True
+        )
+
+
+def discovery_is_off(environment: Mapping[str, str]) -> bool:
+    """Return whether rcl keeps the process from finding others (discovery_options.c)."""
+    return environment.get(_RANGE, "").upper() == "OFF"
 
 
 def domain_of(environment: Mapping[str, str]) -> int:

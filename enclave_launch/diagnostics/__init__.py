@@ -112,6 +112,11 @@ class Code(str, Enum):
     MIDDLEWARE_REFUSED = "middleware-refused", "The middleware of a process is not known to read enclaves"
     PREFIX_REFUSED = "prefix-refused", "Something between launch and a program may change its environment"
     SECURITY_CONFIGURED = "security-configured", "A DDS configuration has security properties of its own"
+    DISCOVERY_SERVER = (
+        "discovery-server",
+        "A discovery server, or no discovery, keeps secured processes apart",
+    )
+    DISCOVERY_OFF = "discovery-off", "A process is set to discover nobody"
     VARIABLE_OVERRIDDEN = "variable-overridden", "A security variable of the launch file has no effect"
 
     def __new__(cls, value: str, meaning: str = "") -> Code:

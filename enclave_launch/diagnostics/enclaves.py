@@ -174,6 +174,22 @@ def security_configured(
     return Diagnostic(Code.SECURITY_CONFIGURED, process, text, place, "take it out, or write it out in full")
 
 
+def discovery_server(process: str, variable: str, value: str, why: str, place: SourceLocation) -> Diagnostic:
+    """Report what keeps a secured process from meeting others, or lets it meet others without a handshake."""
+    shown = value if len(value) <= 60 else f"{value[:57]}..."
+    text = f"{variable} of {process} {why}: {shown}"
+    remedy = (
+        f"remove it for secured processes (unset {variable} in the shell too). Hosts that multicast does not reach are "
+        "named in ROS_STATIC_PEERS from iron on, before it in initialPeersList of a Fast DDS profile"
+    )
+    return Diagnostic(Code.DISCOVERY_SERVER, process, text, place, remedy)
+
+
+def discovery_off(process: str, place: SourceLocation) -> Diagnostic:
+    text = f"ROS_AUTOMATIC_DISCOVERY_RANGE=OFF of {process}: it meets no other process"
+    return Diagnostic(Code.DISCOVERY_OFF, process, text, place, "set it to LOCALHOST or SUBNET")
+
+
 def variable_overridden(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
     text = f"{variable}={value} of the launch file has no effect on {process} under --secure"
     return Diagnostic(Code.VARIABLE_OVERRIDDEN, process, text, place)

@@ -102,6 +102,8 @@ def origin_text(item: PlannedProcess | PlannedComponent) -> str:
     if item.origin is InterfaceOrigin.LIBRARY and item.nodes:
         file = item.nodes[0].interface.source.file
         return f"library {'/'.join(file.split('/')[-2:]).removesuffix('.nodl.yaml')}"
+    if item.origin is InterfaceOrigin.POLICY:
+        return "from policy"
     if item.origin is InterfaceOrigin.ANALYSIS:
         return "inferred from its source"
     if item.origin is InterfaceOrigin.RECORDED and item.nodes:

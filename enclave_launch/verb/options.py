@@ -69,6 +69,8 @@ SECURITY: tuple[Option, ...] = (
     ("--warn-expiry TIME", {"default": "30d"}, "warn when an enclave expires within this time (default: 30d)"),
     ("--compatible-subjects", FLAG,
      "certificate subjects as SROS2 writes them; see secure-keystore verify for the exposure"),
+    ("--log-security DIR", PATH,
+     "let each process on Fast DDS write its security log there (ROS_SECURITY_LOG_FILE); other middlewares have none"),
 )  # fmt: skip
 PASSPHRASE: tuple[Option, ...] = (
     ("--ca-passphrase-file FILE", PATH, "passphrase of encrypted CA keys"),
@@ -99,7 +101,8 @@ POLICY: tuple[Option, ...] = (
      "a launch prefix that keeps the environment, although it is not known to (repeatable; 'shell' for shells)"),
     ("--accept-middleware NAME", TEXTS,
      "an RMW_IMPLEMENTATION that reads enclaves, although it is not known to (repeatable)"),
-    ("--policy FILE", PATH, "SROS2 policy merged over the derived one"),
+    ("--policy FILE|DIR", PATH,
+     "SROS2 policy, or a folder of them, merged over the derived one; describes nodes that nothing else describes"),
 )  # fmt: skip
 LOOKING: tuple[Option, ...] = (
     ("--dry-run", FLAG, "print the plan; start nothing, write nothing"),

@@ -149,7 +149,8 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
     if options.dump_params:
         return params_yaml(plan)
     if options.format == "json":
-        security = SecuritySettings(keystore, options.strategy) if keystore else None
+        logs = os.path.abspath(options.log_security) if options.log_security else ""
+        security = SecuritySettings(keystore, options.strategy, logs) if keystore else None
         return plan_json(plan, security) + "\n"
     return _policy_text(plan)
 

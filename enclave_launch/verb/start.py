@@ -160,7 +160,12 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
     """Return the options of provisioning; raises ``UsageError`` for a value that an option does not take."""
     with translated(InvalidInputError, UsageError):
         parse_duration(options.warn_expiry)  # used after provisioning, refused before
-        return SecurityOptions(strategy=options.strategy, keystore=_provision_options(options))
+        keystore = _provision_options(options)
+    folder = options.log_security
+    if folder is not None:
+        with translated(OSError, UsageError, f"--log-security {folder}: "):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return SecurityOptions(strategy=options.strategy, keystore=keystore, log_folder=folder)
 
 
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:

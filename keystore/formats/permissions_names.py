@@ -18,11 +18,13 @@ MAX_NAME_LENGTH = 247
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NAMESPACE = rf"/\Z|(?:/{_TOKEN})+\Z"
-_NODE = rf"{_TOKEN}\Z"
 _FULL_NAME = re.compile(rf"(?:/{_TOKEN})+\Z")
 # What may stand in an expression with wildcards: names plus * ? [abc] [a-z] [!abc], the subset that
 # Cyclone DDS and Fast DDS read alike.
-_PATTERN = re.compile(r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z")
+_CLASS = r"\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\]"
+_PATTERN = re.compile(rf"(?:[A-Za-z0-9_/*?]|{_CLASS})+\Z")
+# SROS2's transform writes the name of a node as it stands, so a wildcard in it is one of the expression.
+_NODE_PATTERN = re.compile(rf"(?:[A-Za-z_*?]|{_CLASS})(?:[A-Za-z0-9_*?]|{_CLASS})*\Z")
 
 Topics = tuple[str, ...]
 Forms = tuple[tuple[str, str], ...]
@@ -128,8 +130,10 @@ def _check_profile(profile: Profile) -> None:
         raise PolicyError(
             f"ns={printable(profile.ns)} is not an absolute namespace; write for example '/' or '/robot'"
         )
-    if not re.match(_NODE, profile.node) or len(profile.node) > 255:
-        raise PolicyError(f"node={printable(profile.node)} is not a node name")
+    if not _NODE_PATTERN.match(profile.node) or len(profile.node) > 255:
+        raise PolicyError(
+            f"node={printable(profile.node)} is not a node name, nor a pattern of names (* ? [abc] [a-z] [!abc])"
+        )
 
 
 def _problem(expression: str) -> str | None:

@@ -93,5 +93,8 @@ class Policy(NamedTuple):
 def _wildcards(enclave: EnclavePolicy) -> Iterator[str]:
     for profile in enclave.profiles:
         for rule in profile.rules:
-            if rule.qualifier is Qualifier.ALLOW and has_wildcard(rule.expression):
-                yield rule.expression
+            name = rule.expression
+            if name[:1] == "~" and has_wildcard(profile.node):
+                name = f"{profile.ns.rstrip('/')}/{profile.node}{name[1:]}"
+            if rule.qualifier is Qualifier.ALLOW and has_wildcard(name):
+                yield name

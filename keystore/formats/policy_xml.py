@@ -2,6 +2,8 @@
 
 Reading accepts what the schema accepts (checked here, to report file and line also in included files),
 merges profiles and enclaves that occur twice, and checks every name as permissions would need it.
+Version 0.1.0 of Dashing and Eloquent is read as 0.2.0, with an enclave for each node. Of a snapshot of a running system
+names that no other start has become patterns, each reported.
 Writing is sorted and stable, so that a derived policy can be committed and reviewed.
 
 SROS2 lets libxml2 include anything (``parse="text"`` of a private file ends up, signed and broadcast, in a topic name).
@@ -26,12 +28,14 @@ from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.safe_xml import parse_xml
+from keystore.formats.snapshot_names import as_pattern, expression_as_pattern, has_number, is_of_a_tool
 
 if TYPE_CHECKING:
     from lxml import etree
 
 
 VERSION = "0.2.0"
+VERSION_OF_ELOQUENT = "0.1.0"
 
 # Group element -> its entries' element and the operations that are its attributes, in output order.
 _GROUPS: dict[str, tuple[str, tuple[Operation, Operation]]] = {
@@ -72,6 +76,23 @@ def read_policy(path: str | Path) -> PolicyDocument:
     return replace(parse_policy(document, str(file), folder=file.parent), file=str(file))
 
 
+def read_policies(path: str | Path) -> PolicyDocument:
+    """Read a policy as ``read_policy`` does, or all of a folder as one. Other XML there is what policies include."""
+    if not Path(path).is_dir():
+        return read_policy(path)
+    folder = Path(path).resolve()
+    reader = _PolicyReader(folder)
+    try:
+        found = [(file, read_bytes(file)) for file in sorted(folder.glob("*.xml"))]
+    except OSError as error:
+        raise PolicyError(f"cannot read policy {printable(error.filename)}: {error.strerror}") from None
+    roots = [PolicyElement(parse_xml(document, str(file)), str(file)) for file, document in found]
+    read = [reader.read(root) for root in roots if root.element.tag == "policy"]
+    if not read:
+        raise PolicyError(f"{printable(path)} holds no policy: no *.xml in it begins with <policy>")
+    return replace(read[-1], file=str(path))
+
+
 def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None = None) -> PolicyDocument:
     """Parse bytes as ``read_policy`` does; includes are followed only with a ``folder`` and below it."""
     root = parse_xml(document, where)
@@ -88,7 +109,10 @@ class _PolicyReader:
 
     def read(self, root: PolicyElement) -> PolicyDocument:
         self._expect(root, "policy", required=("version",))
-        if (version := root.element.get("version", "")) != VERSION:
+        version = root.element.get("version", "")
+        if version == VERSION_OF_ELOQUENT:
+            return self._read_nodes(root)
+        if version != VERSION:
             raise PolicyError(
                 f"{root.where}: policy version {printable(version)} is not supported, only {VERSION}"
             )
@@ -100,13 +124,31 @@ class _PolicyReader:
             self._enclave(enclave)
         return self._result()
 
+    def _read_nodes(self, root: PolicyElement) -> PolicyDocument:
+        """Read a policy of Dashing or Eloquent, where each node had files of its own."""
+        self._warnings.append(
+            f"{root.where}: policy version {VERSION_OF_ELOQUENT} of Dashing and Eloquent knows no enclaves: each node "
+            f"gets the enclave of its name; give the nodes of one process one enclave in a policy of version {VERSION}"
+        )
+        for group in self._some_children(root, "profiles"):
+            self._expect(group, "profiles", optional=("type",))
+            for profile in self._some_children(group, "profile"):
+                self._expect(profile, "profile", required=("ns", "node"))
+                key = (profile.element.get("ns", ""), profile.element.get("node", ""))
+                path = self._path(f"{key[0].rstrip('/')}/{key[1]}", profile.where)
+                rules = self._enclaves.setdefault(path, {}).setdefault(key, {})
+                self._profile(path, Profile(*key, ()), profile, rules)
+        return self._result()
+
+    def _path(self, path: str, where: str) -> str:
+        try:
+            return validate_enclave_name(path)
+        except InvalidEnclaveNameError as error:
+            raise PolicyError(f"{where}: {error}") from None
+
     def _enclave(self, enclave: PolicyElement) -> None:
         self._expect(enclave, "enclave", required=("path",))
-        path = enclave.element.get("path", "")
-        try:
-            validate_enclave_name(path)
-        except InvalidEnclaveNameError as error:
-            raise PolicyError(f"{enclave.where}: {error}") from None
+        path = self._path(enclave.element.get("path", ""), enclave.where)
         if path in self._enclaves:
             self._warnings.append(f"{enclave.where}: enclave {path} is defined again; both are merged")
         profiles = self._enclaves.setdefault(path, {})
@@ -120,11 +162,31 @@ class _PolicyReader:
             if child.element.tag == "metadata" and found:
                 continue
             self._expect(child, "profile", required=("ns", "node"))
-            key = (child.element.get("ns", ""), child.element.get("node", ""))
-            self._profile(path, Profile(*key, ()), child, profiles.setdefault(key, {}))
             found += 1
+            ns, node = child.element.get("ns", ""), child.element.get("node", "")
+            if is_of_a_tool(node):
+                self._warnings.append(
+                    f"{child.where}: enclave {path}: left out: {node} is a node of ros2 or launch that was running; "
+                    "secure-keystore tool-enclave makes an enclave for a tool"
+                )
+                continue
+            key = (ns, self._fixed_name(node, path, child.where))
+            self._profile(path, Profile(*key, ()), child, profiles.setdefault(key, {}))
         if not found:
             raise PolicyError(f"{group.where}: <profiles> needs at least one <profile>")
+
+    def _fixed_name(self, node: str, path: str, where: str) -> str:
+        pattern = as_pattern(node)
+        if pattern != node:
+            self._warnings.append(
+                f"{where}: enclave {path}: {node} is a name that no other start has; granted to {pattern}"
+            )
+        elif has_number(node):
+            self._warnings.append(
+                f"{where}: enclave {path}: {node} ends in a number; if that is a process id, write "
+                f"{node.rpartition('_')[0]}_*"
+            )
+        return pattern
 
     def _profile(self, path: str, profile: Profile, written: PolicyElement, rules: Rules) -> None:
         self._check_name("~/x", profile, written.where)  # checks ns and node
@@ -168,18 +230,32 @@ class _PolicyReader:
         expression = written.element.text or ""
         if len(written.element):
             raise PolicyError(f"{written.where}: <{written.element.tag}> must hold a name only")
-        self._check_name(expression, profile, written.where)
+        recurring = expression_as_pattern(expression)
+        if recurring is None:
+            self._warnings.append(
+                f"{written.where}: enclave {path}: left out: {expression} is of a tool's node"
+            )
+            return
+        if recurring != expression:
+            self._warnings.append(
+                f"{written.where}: enclave {path}: {expression} is a name that no other start has; "
+                f"granted is {recurring}"
+            )
+            expression = recurring
+        name = self._check_name(expression, profile, written.where)
+        is_wildcard = has_wildcard(name)
+        shown = name if has_wildcard(profile.node) else expression
         for operation, qualifier in granted.items():
             rules.setdefault(Rule(operation, qualifier, expression), written.where)
-            if qualifier is Qualifier.DENY or has_wildcard(expression):
-                kind = "wildcard" if has_wildcard(expression) else "denial"
+            if qualifier is Qualifier.DENY or is_wildcard:
+                kind = "wildcard" if is_wildcard else "denial"
                 self._notes.append(
-                    f"{written.where}: enclave {path}: {kind} {qualifier.value} {operation.value} {expression}"
+                    f"{written.where}: enclave {path}: {kind} {qualifier.value} {operation.value} {shown}"
                 )
 
-    def _check_name(self, expression: str, profile: Profile, where: str) -> None:
+    def _check_name(self, expression: str, profile: Profile, where: str) -> str:
         try:
-            full_name(expression, profile)
+            return full_name(expression, profile)
         except PolicyError as error:
             raise PolicyError(f"{where}: {error}") from None
 
@@ -204,7 +280,8 @@ class _PolicyReader:
     def _result(self) -> PolicyDocument:
         enclaves: list[EnclavePolicy] = []
         places: dict[tuple[str, str, str, Rule], str] = {}
-        for path, profiles in sorted(self._enclaves.items()):
+        # An enclave of nothing but tools that were running is none of the robot's.
+        for path, profiles in sorted((path, found) for path, found in self._enclaves.items() if found):
             for (ns, node), rules in profiles.items():
                 places.update({(path, ns, node, rule): place for rule, place in rules.items()})
             found = (Profile(*key, tuple(sorted(rules))) for key, rules in sorted(profiles.items()))

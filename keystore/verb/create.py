@@ -29,7 +29,7 @@ def _imported(which: str) -> common.Table:
 OPTIONS: common.Table = (
     common.KEYSTORE,
     ("--domain-id IDS", {"default": "0"}, "domains of the governance: 0, 0-10, 3,7 or all"),
-    ("--governance FILE.yaml", PATH, "governance instead of SROS2's default"),
+    ("--governance FILE", PATH, "governance instead of SROS2's default, as YAML or XML"),
     ("--ca-valid-for TIME", {"default": "10y"}, "validity of the CAs (10y)"),
     common.VALIDITY,
     *_imported("identity"),

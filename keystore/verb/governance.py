@@ -1,4 +1,4 @@
-"""Put another governance in force, from YAML; signs only when it differs.
+"""Put another governance in force, from YAML or XML; signs only when it differs.
 
 All participants need it at the same time: with different protection kinds they do not talk, without an error.
 """
@@ -15,7 +15,7 @@ from keystore.verb import common
 
 OPTIONS: common.Table = (
     common.KEYSTORE,
-    ("file FILE.yaml", PATH, "see docs: version, domain_rules, topic_rules"),
+    ("file FILE", PATH, "YAML (docs/keystore.md), or DDS-Security's XML, which is written again in one form"),
     *common.CHANGE,
 )
 

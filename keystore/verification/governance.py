@@ -55,9 +55,34 @@ def _shown(value: bool | Protection) -> str:
     return value.value if isinstance(value, Protection) else str(value).lower()
 
 
+def bypasses(governance: Governance) -> Iterator[str]:
+    """Return each topic rule that leads past the enclaves where a Fast DDS discovery server is in reach.
+
+    Such a server spares participants the handshake. Without protection of RTPS messages, and of discovery, metadata
+    and data of a topic, nothing else keeps them apart. Measured on Fast DDS 2.9.1, where data passed as soon as
+    liveliness of the topic was not protected either.
+    """
+    for rule in governance.domain_rules:
+        for topic in rule.topic_rules if rule.rtps_protection_kind is Protection.NONE else ():
+            protected = (
+                topic.enable_discovery_protection
+                or topic.metadata_protection_kind is not Protection.NONE
+                or topic.data_protection_kind is not Protection.NONE
+            )
+            if not protected and (topic.enable_read_access_control or topic.enable_write_access_control):
+                yield f"topics {topic.topic_expression} in domains {rule.domains}"
+
+
 def check_strength(root: Path, governance: Governance, required: Governance | None) -> Iterator[Finding]:
     """Check the strength, or against ``required``, which may be weaker."""
     again = repair.run(root, "governance", "FILE.yaml", note="must reach all participants together")
+    for where in bypasses(governance):
+        yield Finding(
+            Severity.ERROR, "governance-open", layout.GOVERNANCE,
+            f"{where} have no protection, and RTPS messages neither: through a Fast DDS discovery server processes "
+            "without an enclave can exchange data with secured ones, despite access control",
+            f"{again}; with rtps_protection_kind: SIGN, or metadata_protection_kind: SIGN for these topics",
+        )  # fmt: skip
     if required is not None:
         if governance != required:
             yield Finding(

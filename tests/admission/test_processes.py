@@ -214,14 +214,48 @@ def test_a_dds_configuration_is_found_where_the_middleware_finds_it(
     variables = {"PART": "&lt;Security/>", "PLAIN": "&lt;Tracing/>", name: value}
     inner = "".join(f'<env name="{each}" value="{text}"/>' for each, text in variables.items())
     text = TALKER.replace("<node ", f'<node cwd="{tmp_path}" ', 1).format(inner)
-    assert codes(plan(text)) == ([Code.SECURITY_CONFIGURED] if is_refused else [])
+    code = Code.DISCOVERY_SERVER if value.startswith("server") else Code.SECURITY_CONFIGURED
+    assert codes(plan(text)) == ([code] if is_refused else [])
+
+
+def test_a_discovery_server_is_refused_on_fast_dds_with_the_cure(plan: Plan) -> None:
+    server = '<env name="ROS_DISCOVERY_SERVER" value="{}"/><env name="RMW_IMPLEMENTATION" value="{}"/>'
+    (problem,) = plan(TALKER.format(server.format("127.0.0.1:11811", "rmw_fastrtps_cpp"))).problems
+    assert problem.code is Code.DISCOVERY_SERVER
+    assert "never meet: 127.0.0.1:11811" in problem.text and "ROS_STATIC_PEERS" in problem.remedy
+    for address, middleware in (("", "rmw_fastrtps_cpp"), ("127.0.0.1:11811", "rmw_cyclonedds_cpp")):
+        assert not plan(TALKER.format(server.format(address, middleware))).problems
+
+
+def test_a_server_of_the_shell_counts_and_one_that_the_launch_takes_away_does_not(
+    plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DISCOVERY_SERVER", "127.0.0.1:11811")
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
+    assert codes(plan(TALKER.format(""))) == [Code.DISCOVERY_SERVER]
+    assert codes(plan(TALKER.format('<env name="ROS_DISCOVERY_SERVER" value=""/>'))) == []
+
+
+@pytest.mark.parametrize("protocol", ["NONE", "STATIC"])
+def test_profiles_that_switch_discovery_off(plan: Plan, tmp_path: Path, protocol: str) -> None:
+    (tmp_path / "p.xml").write_text(f"<dds><discoveryProtocol>{protocol}</discoveryProtocol></dds>")
+    text = TALKER.format(f'<env name="FASTRTPS_DEFAULT_PROFILES_FILE" value="{tmp_path}/p.xml"/>')
+    assert codes(plan(text)) == [Code.DISCOVERY_SERVER]
+
+
+def test_discovery_that_is_off_is_a_warning(plan: Plan) -> None:
+    text = '<env name="ROS_AUTOMATIC_DISCOVERY_RANGE" value="{}"/>'
+    for value, expected in (("OFF", True), ("LOCALHOST", False), ("SUBNET", False)):
+        found = plan(TALKER.format(text.format(value)))
+        assert not found.problems
+        assert (Code.DISCOVERY_OFF in {each.code for each in found.warnings}) is expected
 
 
 def test_default_profiles_in_the_working_directory_of_a_node(plan: Plan, tmp_path: Path) -> None:
     text = TALKER.replace("<node ", f'<node cwd="{tmp_path}" ', 1)
     assert codes(plan(text.format(""))) == []
     (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").write_text(SERVER)
-    assert codes(plan(text.format(""))) == [Code.SECURITY_CONFIGURED]
+    assert codes(plan(text.format(""))) == [Code.DISCOVERY_SERVER]
     assert codes(plan(text.format('<env name="SKIP_DEFAULT_XML_FILE" value="1"/>'))) == []
 
 

@@ -184,6 +184,34 @@ def test_setting_governance_signs_once(tmp_path: Path) -> None:
     assert not verify(root, required=Requirements(Governance())).is_good
 
 
+@pytest.mark.parametrize(
+    ("changed", "is_open"),
+    [
+        ("", True),
+        ("rtps_protection_kind: NONE->SIGN", False),
+        ("metadata_protection_kind: NONE->SIGN", False),
+        ("data_protection_kind: NONE->SIGN", False),
+        ("enable_discovery_protection: false->true", False),
+    ],
+)
+def test_a_governance_that_a_discovery_server_leads_past_is_an_error(
+    tmp_path: Path, changed: str, is_open: bool
+) -> None:
+    text = (
+        "version: 1\ndomain_rules:\n- rtps_protection_kind: NONE\n  topic_rules:\n  - topic_expression: rt/rosout\n"
+        "    enable_discovery_protection: false\n    metadata_protection_kind: NONE\n    data_protection_kind: NONE\n"
+    )
+    name, _, values = changed.partition(": ")
+    before, _, after = values.partition("->")
+    text = text.replace(f" {name}: {before}", f" {name}: {after}") if changed else text
+    governance = parse_governance_yaml(text.encode(), "x.yaml")
+    root = filled(tmp_path / "ks")
+    set_governance(root, governance, options=QUICK)
+    for required in (None, Requirements(governance)):
+        found = {one.code for one in verify(root, required=required).findings if one.severity.fails}
+        assert ("governance-open" in found) is is_open, "also where it is the one that is required"
+
+
 def test_an_edited_twin_is_found_and_written_back(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks")
     twin = root / "enclaves/governance.xml"

@@ -167,10 +167,10 @@ def parameters(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
 
 
 def security_variables(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
-    """Yield ``ROS_SECURITY_*`` variables that the launch file sets itself."""
+    """Yield variables that the launch file sets and ``--secure`` sets, too; those of the security log are its own."""
     for process in document.processes:
         for name, value in sorted(process.environment.items()):
-            if name.startswith("ROS_SECURITY_"):
+            if name.startswith("ROS_SECURITY_") and not name.startswith("ROS_SECURITY_LOG_"):
                 yield _about(process, "security-variable-set", f"the launch file sets {name}={value}")
 
 

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <optional>
+#include <sstream>
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
@@ -53,6 +54,27 @@ std::optional<std::string> token_key(const std::string& directory) {
   return file >> uri ? std::optional(uri) : std::nullopt;
 }
 
+// A discovery server without security, at the address and with the prefix of server 0 that ROS_DISCOVERY_SERVER means.
+void serve_discovery(dds::DomainParticipantQos& qos, const std::string& port) {
+  auto& builtin = qos.wire_protocol().builtin;
+  builtin.discovery_config.discoveryProtocol = rtps::DiscoveryProtocol_t::SERVER;
+  std::istringstream("44.53.00.5f.45.50.52.4f.53.49.4d.41") >> qos.wire_protocol().prefix;
+  rtps::Locator_t locator = locator_of("127.0.0.1");
+  locator.port = static_cast<uint32_t>(std::stoi(port));
+  builtin.metatrafficUnicastLocatorList.clear();
+  builtin.metatrafficUnicastLocatorList.push_back(locator);
+}
+
+// The security log, as rmw_fastrtps switches it on (rmw_fastrtps_shared_cpp/src/utils.cpp).
+void log_security(dds::DomainParticipantQos& qos, const std::string& file) {
+  auto& properties = qos.properties().properties();
+  const std::string log = "dds.sec.log.builtin.DDS_LogTopic.";
+  properties.emplace_back("dds.sec.log.plugin", "builtin.DDS_LogTopic");
+  properties.emplace_back(log + "log_file", file);
+  const char* level = std::getenv("ROS_SECURITY_LOG_VERBOSITY");
+  properties.emplace_back(log + "logging_level", level ? std::string(level) + "_LEVEL" : "ERROR_LEVEL");
+}
+
 bool exists(const std::string& path) { return std::ifstream(path).good(); }
 
 // The properties of rmw_fastrtps (rmw_fastrtps_shared_cpp/src/participant.cpp).
@@ -84,6 +106,9 @@ Participant::Participant(std::string label, const std::string& directory, uint32
   qos.name(label_);
   stay_in_one_network(qos);
   if (directory != "-") secure(qos, directory);
+  const char* log = std::getenv("ROS_SECURITY_LOG_FILE");
+  if (directory != "-" && log != nullptr) log_security(qos, log);
+  if (const char* port = std::getenv("PROBE_SERVER_PORT")) serve_discovery(qos, port);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   participant_ = factory->create_participant(domain, qos);
   if (participant_ == nullptr) return;
