@@ -15,13 +15,13 @@ from typing import NamedTuple
 from enclave_addons.inference.kernel.findings import Findings, FoundEndpoint, FoundNode
 from enclave_addons.inference.kernel.store import CellId, CellStore, Written, same
 from enclave_addons.inference.kernel.texts import Input, Text, pieces_of, text_of
-from enclave_addons.inference.kernel.values import Obj, Value
+from enclave_addons.inference.kernel.values import LocalCells, Obj, Value
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
 
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
-MAX_STEPS = 300_000
+MAX_STEPS = 400_000
 MAX_DEPTH = 60
 MAX_CONTEXTS = 60  # of one function; then its calls are told apart by their object alone
 MAX_ROUNDS = 10
@@ -60,7 +60,7 @@ class Guard(NamedTuple):
 
 @dataclass
 class Callback:
-    """Something that may be called at any time, and the cells that it read when it was called last."""
+    """Something that may be called at any time, and what it read when it was called last."""
 
     call: Callable[[], object]
     guards: tuple[Guard, ...]
@@ -76,10 +76,6 @@ class Result(NamedTuple):
     made: list[Obj]
     ended: bool
 
-    def holds(self) -> bool:
-        """Return whether all that the call read is as it was."""
-        return all(same(cells.get(key, ()), value) for cells, key, value in self.reads.values())
-
 
 class Machine:
     """The state of one run."""
@@ -88,26 +84,28 @@ class Machine:
         self.store = CellStore()
         self.findings = Findings()
         self.steps = 0
+        self.turns = 1  # of known loops inside each other, at the present point
         self.forks = 0  # how many undecided branches and loops surround the present point
         self.guards: tuple[Guard, ...] = ()
         self.context: object = None
         self.ended = False  # what was evaluated last never comes back
         self.settling = False
+        self.widening = False  # callbacks did not come to an end in some rounds
         self.has_inputs = False  # something of a parameter, option or variable was asked for
         self.asks_launch = False  # what it holds may decide more than names
         self.callbacks: dict[object, Callback] = {}
+        self.cost: dict[object, int] = {}  # steps that all runs of some code took
+        self.makers: set[object] = set()  # code that made an interface, itself or by a call
         self._contexts: dict[object, dict[object, int]] = {}
         self._objects: dict[tuple[object, object, str], Obj] = {}
         self._active: list[tuple[object, object]] = []
         self._made: list[Obj] = []  # in the order in which they were made or made again
-        self._waits = 0  # how often callbacks were called meanwhile
         self._results: dict[object, Result] = {}
-        self._changed: set[CellId] = set()  # by the latest round of callbacks
 
     def step(self, count: int = 1) -> None:
         """Count steps. Raises ``StepLimitExceeded``."""
         self.steps += count
-        if self.steps + self.store.work // 4 > MAX_STEPS:
+        if self.steps + self.store.work // 16 > MAX_STEPS:
             raise StepLimitExceeded
 
     # --- branches and loops ---------------------------------------------------------------------------------
@@ -167,15 +165,19 @@ class Machine:
     def each_element(self, count: int, jumps: Jumps, body: Callable[[int], int]) -> int:
         """Run ``body`` once for each of ``count`` known elements, each in a context of its own."""
         ways = 0
-        outer = self.context
+        outer, turns = self.context, self.turns
+        self.turns *= max(count, 1)
         for index in range(count):
             self.context = self._context_of(outer, index)
             taken = self.turn(jumps, partial(body, index))
             self.context = outer
             ways |= taken & ~NEXT
             if not taken & NEXT:
-                return ways
-        return ways | NEXT
+                break
+        else:
+            ways |= NEXT
+        self.turns = turns
+        return ways
 
     def repeat(self, jumps: Jumps, body: Side) -> int:
         """Run ``body`` any number of times, until one more turn adds nothing."""
@@ -197,51 +199,70 @@ class Machine:
     # --- calls and objects ----------------------------------------------------------------------------------
 
     def in_context(
-        self, code: object, receiver: object, values: object, body: Callable[[], Value], nested: int = 4
+        self,
+        code: object,
+        receiver: object,
+        key: object,
+        arguments: object,
+        body: Callable[[], Value],
+        nested: int = 4,
     ) -> Value | None:
-        """Run ``body`` in the context of its arguments; ``None`` if ``code`` runs ``nested`` times already."""
+        """Run ``body`` in the context ``key``; ``None`` if ``code`` runs ``nested`` times already.
+
+        Args:
+            receiver: Tells contexts apart where there are too many keys.
+            arguments: All that ``body`` gets. A call with equal ones is not run again while what it read is as it was.
+        """
         known = self._contexts.setdefault(code, {})
-        key = values if len(known) < MAX_CONTEXTS else ("receiver", receiver)
+        if key not in known and len(known) >= MAX_CONTEXTS:
+            key = ("receiver", receiver)
         if len(self._active) >= MAX_DEPTH or (code, key) in self._active:
             return None
         if sum(running is code for running, _ in self._active) >= nested:
             return None
         self.step()
-        known_result = self._results.get((code, key, self.guards))
-        if known_result is not None:
-            self.store.work += len(known_result.reads)
-            if known_result.holds():
-                return self._again(known_result)
+        call = (code, key, arguments, self.guards)
+        known_result = self._results.get(call)
+        if known_result is not None and self.as_it_was(known_result.reads):
+            return self._again(known_result)
         outer, self.context = self.context, self._context_of(code, key)
         self._active.append((code, key))
         reads, self.store.reads = self.store.reads, {}
-        mark, made, waits = self.store.mark(), len(self._made), self._waits
+        mark, made, steps = self.store.mark(), len(self._made), self.steps
         try:
             value = body()
             own, written = self.store.reads, self.store.written(mark)
-            if waits == self._waits and len(written) <= MAX_REPLAYED:
-                self._results[code, key, self.guards] = Result(
-                    value, own, written, self._made[made:], self.ended
-                )
+            if len(written) <= MAX_REPLAYED:
+                self._results[call] = Result(value, own, written, self._made[made:], self.ended)
             return value
         finally:
-            self.store.work += len(self.store.reads or ())
-            if reads is not None:
-                for place, read in (self.store.reads or {}).items():
-                    reads.setdefault(place, read)
-            self.store.reads = reads
+            self.cost[code] = self.cost.get(code, 0) + self.steps - steps
+            inner, self.store.reads = self.store.reads or {}, reads
+            self.store.work += len(inner)
+            for read in inner.values():
+                self.store.note(read)
             self._active.pop()
             self.context = outer
+
+    def is_new(self, code: object, key: object) -> bool:
+        """Return whether ``code`` did not run in the context ``key`` yet."""
+        return key not in self._contexts.get(code, {})
+
+    def as_it_was(self, reads: Written) -> bool:
+        """Return whether all that was read holds what it held then."""
+        self.store.work += len(reads)
+        return all(same(cells.get(key, ()), value) for cells, key, value in reads.values())
 
     def _again(self, known: Result) -> Value:
         """Repeat a call whose inputs are as they were: its writes, and what it makes, which now stands for several."""
         for cells, key, value in known.written.values():
+            if isinstance(cells, LocalCells) and cells.reads is known.reads:
+                cells.reads = self.store.reads  # its own variables, which a closure keeps
             self.store.write(cells, key, value)
         for obj in known.made:
             obj.summary = True
-        if self.store.reads is not None:
-            for place, read in known.reads.items():
-                self.store.reads.setdefault(place, read)
+        for read in known.reads.values():
+            self.store.note(read)
         self.store.work += len(known.reads) + len(known.written)
         self.ended = known.ended
         return known.value
@@ -277,30 +298,26 @@ class Machine:
         if self.settling:
             return
         self.settling = True
-        self._waits += 1
         kept, self.guards = self.guards, ()
         for number in range(MAX_ROUNDS if at_end else 2):
-            changed: set[CellId] = set()
+            changed: list[CellId] = []
             known = len(self.callbacks)
             for callback in list(self.callbacks.values()):
-                if callback.reads is None or not (changed | self._changed).isdisjoint(callback.reads):
-                    changed.update(self._called(callback, number >= WIDEN_FROM))
-            self._changed = changed
+                if callback.reads is None or not self.as_it_was(callback.reads):
+                    self.widening = number >= WIDEN_FROM
+                    changed += self._called(callback)
             if not changed and len(self.callbacks) == known:
                 break
         else:
             if at_end:
                 self.unsettled()
-        if not at_end:
-            for callback in self.callbacks.values():  # the program goes on, and may change what they read
-                callback.reads = None
         self.guards = kept
-        self.settling = False
+        self.settling = self.widening = False
 
     def unsettled(self) -> None:
         """Say that the callbacks do not come to an end."""
 
-    def _called(self, callback: Callback, texts_too: bool) -> list[CellId]:
+    def _called(self, callback: Callback) -> list[CellId]:
         outer_reads, self.store.reads = self.store.reads, {}
         self.guards = callback.guards
         mark = self.store.mark()
@@ -309,9 +326,12 @@ class Machine:
         self.forks -= 1
         outcome = self.store.written(mark)
         self.store.undo(mark)
-        callback.reads = self.store.reads
+        callback.reads, self.store.reads = self.store.reads, None
+        changed = self.store.absorb(outcome, self.widening)
         self.store.reads = outer_reads
-        return self.store.absorb(outcome, texts_too)
+        for read in callback.reads.values():
+            self.store.note(read)
+        return changed
 
     # --- findings -------------------------------------------------------------------------------------------
 
@@ -338,6 +358,7 @@ class Machine:
             pieces = pieces_of(name) if name else ()
             name = text_of((*(each for each in dict.fromkeys(conditions) if each not in pieces), *pieces))
         found = FoundEndpoint(kind, name, type_name, source, qos)
+        self.makers.update(code for code, _ in self._active)
         node.endpoints.setdefault(found)
         return found
 

@@ -6,10 +6,17 @@ from collections.abc import Iterator
 
 from enclave_addons.inference.kernel.findings import Findings, FoundEndpoint, FoundNode, Options
 from enclave_addons.inference.kernel.texts import Hole, Input, OwnName, Piece, Text, text_of
-from enclave_addons.inference.kernel.values import ITEMS, Items, Obj, Unknown, Value
+from enclave_addons.inference.kernel.values import ITEMS, RANDOM, Items, Obj, Unknown, Value
 from enclave_addons.inference.start import LaunchKey
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
-from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
+from nodl.node_interface import (
+    RANDOM_ENDING,
+    Certainty,
+    ClientLibrary,
+    Endpoint,
+    Gap,
+    NodeInterface,
+)
 from nodl.ros_arguments import parse_ros_arguments
 
 _TYPE_NAMES: dict[type, str] = {bool: "bool", int: "int", float: "double", str: "string"}
@@ -34,6 +41,8 @@ def _interfaces_of(
     gaps = node.gaps.listed()
     if not node.created:
         gaps = gaps or [Gap(node.source, "the node that these interfaces belong to is not known")]
+    elif random := _random_name(node.names):
+        names = [random]
     elif names == [None] or not all(isinstance(atom, str) for atom in node.names):
         gaps.append(Gap(node.source, f"the name of this node is made at run time{_made_of(node.names)}"))
     if not all(atom is None or isinstance(atom, str) for atom in node.namespaces):
@@ -94,6 +103,17 @@ def _own_arguments(node: FoundNode, findings: Findings, gaps: list[Gap]) -> tupl
         else:
             rules += found.remaps
     return tuple(rules)
+
+
+def _random_name(names: Value) -> str | None:
+    """Return the known beginning of a name whose rest is different at each start, with ``RANDOM_ENDING``."""
+    pieces = names[0].pieces if len(names) == 1 and isinstance(names[0], Text) else ()
+    first, others = (pieces[0], pieces[1:]) if pieces else (None, ())
+    random = [piece.why == RANDOM for piece in others if isinstance(piece, Hole)]
+    known = all(isinstance(piece, (str, Hole)) for piece in others)
+    if not (isinstance(first, str) and first.endswith("_") and known and all(random)):
+        return None
+    return first.rstrip("_") + RANDOM_ENDING
 
 
 def _made_of(value: Value) -> str:

@@ -38,14 +38,20 @@ class CellStore:
         """Return what a cell holds."""
         value = cells.get(key, default)
         if self.reads is not None and (id(cells), key) not in self.reads:
-            self.reads[id(cells), key] = cells, key, cells.get(key, BOTTOM)
+            self.note((cells, key, cells.get(key, BOTTOM)))
         return value
+
+    def note(self, read: tuple[Cells, object, Value]) -> None:
+        """Note that a cell was read, unless it is a variable of the call that reads."""
+        cells, key, _ = read
+        if self.reads is not None and not (type(cells) is LocalCells and cells.reads is self.reads):
+            self.reads.setdefault((id(cells), key), read)
 
     def write(self, cells: Cells, key: object, value: Value) -> bool:
         """Replace what a cell holds; return whether that changed it."""
         old = cells.get(key)
-        if self.reads is not None and type(cells) is not LocalCells and (id(cells), key) not in self.reads:
-            self.reads[id(cells), key] = cells, key, BOTTOM if old is None else old
+        if self.reads is not None and (id(cells), key) not in self.reads:
+            self.note((cells, key, BOTTOM if old is None else old))
         if old is not None and (old is value or same(old, value)):
             return False
         self.trail.append((cells, key, old))
@@ -84,7 +90,12 @@ class CellStore:
         """Undo a side that ends in a jump. What it held stays in the trail for ``join_seen``."""
         held = self.seen(mark)
         self.undo(mark)
-        self.trail += list(held.values())
+        self.keep(held)
+
+    def keep(self, seen: Written) -> None:
+        """Keep values in the trail that a side held which does not go on."""
+        for cells, key, value in seen.values():
+            self.trail += [(cells, key, cells.get(key)), (cells, key, value)]
 
     def seen(self, mark: int) -> Written:
         """Return every value that each cell held since ``mark``."""

@@ -16,6 +16,7 @@ Cells: TypeAlias = dict[object, Value]
 
 MAX_TEXTS = 32
 MAX_ATOMS = 64
+MAX_NUMBERS = 12
 NUMBERS = (int, float)
 CONSTANTS = (str, int, float, bool, bytes, type(None))
 
@@ -49,13 +50,19 @@ class External:
 
 
 class LocalCells(dict[object, Value]):
-    """The variables of one call. ``dead``: the call has returned and nothing can see them any more."""
+    """The variables of one call.
 
-    __slots__ = ("dead",)
+    Attributes:
+        dead: The call has returned and nothing can see them any more.
+        reads: Where the call notes what it reads. Its own variables are none of that.
+    """
 
-    def __init__(self) -> None:
+    __slots__ = ("dead", "reads")
+
+    def __init__(self, reads: object = None) -> None:
         super().__init__()
         self.dead = False
+        self.reads = reads
 
 
 class Obj:
@@ -120,6 +127,7 @@ NONE: Value = (None,)
 BOOLEAN: Value = (True, False)
 ABSENT: Value = (Absent(),)
 ANY = unknown("a value that the program computes")
+RANDOM = "a value that is different at each start"
 OF_LAUNCH = unknown("a value that only a launch decides")
 
 
@@ -158,6 +166,9 @@ def _limited(value: Value) -> Value:
     texts = [atom for atom in value if isinstance(atom, (str, Text))]
     if len(texts) > MAX_TEXTS:
         return join(tuple(atom for atom in value if not isinstance(atom, (str, Text))), widened(texts))
+    numbers = sum(type(atom) in NUMBERS for atom in value)
+    if numbers > MAX_NUMBERS:  # it counts something
+        return (*(atom for atom in value if type(atom) not in NUMBERS and type(atom) is not Unknown), *ANY)
     return unknown("too many possible values") if len(value) > MAX_ATOMS else value
 
 

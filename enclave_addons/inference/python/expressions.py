@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -202,9 +203,15 @@ def _dictionary(run: Run, node: ast.Dict, frame: Frame) -> Value:
     return (obj,)
 
 
+@functools.lru_cache(maxsize=4096)
+def _has_lambda(node: ast.expr) -> bool:
+    return any(isinstance(each, ast.Lambda) for each in ast.walk(node))
+
+
 def _comprehension(run: Run, node: Any, frame: Frame) -> Value:
     """Run a comprehension as the loops that it stands for, in a scope of its own."""
-    inner = Frame(frame.module, LocalCells(), frame, frame.jumps, frame.function, is_comprehension=True)
+    cells = LocalCells(run.store.reads)
+    inner = Frame(frame.module, cells, frame, frame.jumps, frame.function, is_comprehension=True)
     found: list[Value] = []
     pairs: list[tuple[Value, Value]] = []
     known = True
@@ -254,6 +261,7 @@ def _comprehension(run: Run, node: Any, frame: Frame) -> Value:
         return run.repeat(jumps, lambda: body(items.any_element() or ANY))
 
     level(0)
+    cells.dead = not _has_lambda(node)
     if isinstance(node, ast.DictComp):
         obj = run.allocate(node, "dict")
         for key, value in pairs:

@@ -9,15 +9,19 @@ from collections.abc import Iterator
 from enclave_addons.inference.kernel.machine import NEXT, RETURN, Jumps
 from enclave_addons.inference.kernel.values import (
     ABSENT,
+    ANY,
     BOTTOM,
     NONE,
+    NUMBERS,
     Items,
     LocalCells,
     Obj,
+    Unknown,
     Value,
     join,
     join_all,
     unknown,
+    widen,
 )
 from enclave_addons.inference.python.containers import fill
 from enclave_addons.inference.python.objects import (
@@ -32,9 +36,10 @@ from enclave_addons.inference.python.objects import (
     Partial,
     Wrapped,
 )
-from enclave_addons.inference.python.run import CALLS, Run
+from enclave_addons.inference.python.run import CALLS, OF_PROCESS, Run
 
 MAX_OBJECTS = 3
+MAX_COST = 20_000  # steps of a function that makes no interface, until it is run for all arguments at once
 
 
 def new_function(run: Run, node: FunctionNode, frame: Frame) -> Function:
@@ -127,6 +132,15 @@ def bind(run: Run, function: Function, args: Arguments, call: Call) -> dict[str,
     return bound
 
 
+def _alike(value: Value) -> Value:
+    """Return ``value`` with one unknown in place of all, so that reasons make no contexts."""
+    return tuple(ANY[0] if _is_of_program(atom) else atom for atom in value)
+
+
+def _is_of_program(atom: object) -> bool:
+    return isinstance(atom, Unknown) and atom.why not in OF_PROCESS
+
+
 def _key(value: Value) -> object:
     """Return what tells contexts apart: the value, but of many objects only their classes."""
     objects = [atom for atom in value if isinstance(atom, Obj)]
@@ -138,12 +152,19 @@ def _key(value: Value) -> object:
 def call_function(run: Run, function: Function, call: Call) -> Value:
     """Run the body of ``function`` in the context of its arguments."""
     bound = bind(run, function, call.args, call)
-    key = tuple(map(_key, bound.values()))
+    creates = run.creates(function.module.source, function.node)
+    if run.cost.get(function, 0) > MAX_COST and not creates and function not in run.makers:
+        bound = _with_earlier(run, function, bound)
+    arguments = tuple(map(_alike, bound.values()))
+    key = tuple(map(_key, arguments))
+    if run.widening and run.is_new(function, key):  # a number may grow with each round
+        bound = {name: _without_numbers(value) for name, value in bound.items()}
+        arguments = tuple(map(_alike, bound.values()))
+        key = tuple(map(_key, arguments))
     receiver = key[0] if key else None
     run.entered.add(function.node)
-    creates = run.creates(function.module.source, function.node)
     value = run.in_context(
-        function, receiver, key, lambda: _run_body(run, function, bound), 4 if creates else 2
+        function, receiver, key, arguments, lambda: _run_body(run, function, bound), 4 if creates else 2
     )
     if value is not None:
         return value
@@ -152,10 +173,26 @@ def call_function(run: Run, function: Function, call: Call) -> Value:
     return unknown("the result of a function that calls itself")
 
 
+def _without_numbers(value: Value) -> Value:
+    kept = tuple(atom for atom in value if type(atom) not in NUMBERS)
+    return value if len(kept) == len(value) else join(kept, ANY)
+
+
+def _with_earlier(run: Run, function: Function, bound: dict[str, Value]) -> dict[str, Value]:
+    """Join the arguments of a call with those of earlier ones, so that the body is run for all of them at once."""
+    earlier = run.joined.setdefault(function, {})
+    for name, value in bound.items():
+        earlier[name] = widen(earlier.get(name, BOTTOM), value, texts_too=True)
+    return dict(earlier)
+
+
 def _run_body(run: Run, function: Function, bound: dict[str, Value]) -> Value:
     node = function.node
     keeps = _makes_closures(node)
-    cells: LocalCells = run.captured.setdefault(run.context, LocalCells()) if keeps else LocalCells()
+    cells = LocalCells(run.store.reads)
+    if keeps:
+        cells = run.captured.setdefault(run.context, cells)
+        cells.reads = run.store.reads
     mark = run.store.mark()
     frame = Frame(function.module, cells, function.closure, Jumps(mark), function)
     frame.forks = run.forks

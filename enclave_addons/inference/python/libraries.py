@@ -22,6 +22,7 @@ from enclave_addons.inference.kernel.values import (
     CONSTANTS,
     NONE,
     OF_LAUNCH,
+    RANDOM,
     External,
     Items,
     Key,
@@ -91,6 +92,8 @@ def _number(kind: Callable[[Any], object]) -> Model:
         atom = sole(call.at(0))
         if isinstance(atom, Text):
             return OF_LAUNCH
+        if isinstance(atom, Unknown) and atom.why == RANDOM:
+            return (atom,)
         if not isinstance(atom, (int, float, str)) or len(str(atom)) > 40 or len(call.args.positional) != 1:
             return ANY
         try:
@@ -323,12 +326,15 @@ def _object_new(run: Run, call: Call) -> Value:
     return tuple(made) or ANY
 
 
+_SET_BY_ROS: dict[str, Value] = {"ROS_VERSION": ("2",), "ROS_PYTHON_VERSION": ("3",)}
+
+
 def _environment(run: Run, call: Call) -> Value:
     """Return what a variable holds; ``os.environ[...]``, ``.get`` and ``getenv`` with a default."""
     names, default = call.at(0) or ANY, call.at(1, "default") or NONE
     result: Value = BOTTOM if len(strings(names)) == len(names) else unknown("an environment variable")
     for name in strings(names):
-        held = run.store.read(run.environment, name)
+        held = run.store.read(run.environment, name) or _SET_BY_ROS.get(name)
         if held:
             result = join(result, held)
             continue
@@ -442,6 +448,10 @@ def _globals(run: Run, call: Call) -> Value:
     return (made,)
 
 
+def _random(run: Run, call: Call) -> Value:
+    return unknown(RANDOM)
+
+
 def _callable(run: Run, call: Call) -> Value:
     atom = sole(call.at(0))
     return (True,) if isinstance(atom, (Function, Bound, Class, Partial)) else BOOLEAN
@@ -477,6 +487,9 @@ FUNCTIONS: dict[str, Model] = {
     "itertools.chain": _chain,
     "random.choice": _chosen, "copy.copy": _copy, "copy.deepcopy": _copy,
     **dict.fromkeys(("importlib.import_module", "importlib.reload"), _import_dynamic),
+    **dict.fromkeys(
+        ("uuid.uuid1", "uuid.uuid4", "os.getpid", "time.time", "time.time_ns", "time.monotonic", "random.random",
+         "random.randint", "random.randrange", "random.getrandbits", "secrets.token_hex"), _random),
     "argparse.ArgumentParser": arguments.made_parser,
 }  # fmt: skip
 
@@ -545,6 +558,11 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     return external(path.partition("(")[0] + "()") if "." in path else unknown(f"the result of {path}()")
 
 
+def _is_parameter_listener(path: str) -> bool:
+    """Return whether ``path`` is a class that generate_parameter_library makes, which only declares parameters."""
+    return path.endswith(".ParamListener") and "_parameters." in path
+
+
 def hand_over(run: Run, path: str, call: Call) -> None:
     """Hand the arguments to code of others: it may call them, and may make interfaces on a node."""
     name = path.rpartition(".")[2]
@@ -569,7 +587,7 @@ def _escape(run: Run, atom: object, path: str, call: Call) -> None:
             for each in value:
                 for inner in join_all(each.exact or (each.rest,)) if isinstance(each, Items) else (each,):
                     _escape(run, inner, path, call)
-    if is_harmless(path):
+    if is_harmless(path) or _is_parameter_listener(path):
         return
     if rclpy_models.is_node(run, atom):
         node = run.findings.nodes[atom]

@@ -46,14 +46,13 @@ from enclave_addons.inference.python.conditions import truth
 from enclave_addons.inference.python.containers import elements, plain
 from enclave_addons.inference.python.formatting import as_texts, text_value
 from enclave_addons.inference.python.objects import Arguments, Call
-from enclave_addons.inference.python.run import COMMAND_LINE, FOREIGN_FIELDS, Run
+from enclave_addons.inference.python.run import FOREIGN_FIELDS, OF_PROCESS, Run
 from enclave_addons.inference.start import LaunchedNode
 from nodl.builtin_interfaces import LOGGER_SERVICES, PARAMETER_SERVICES
 from nodl.node_interface import EndpointKind, QosPolicies
 
 NODE_CLASS = "rclpy.node.Node"
 PARAMETER = "rclpy.parameter.Parameter"
-OF_PROCESS = (COMMAND_LINE, "an argument that is not given", "an argument that nothing analysed gives")
 UNKNOWN_NODE = "an unknown node"
 NodeMethod = Callable[[Run, FoundNode, Call], Value]
 

@@ -54,6 +54,7 @@ from nodl.source_ref import SourceRef
 
 BUILTINS = frozenset(dir(builtins))
 COMMAND_LINE = "command line arguments"
+OF_PROCESS = (COMMAND_LINE, "an argument that is not given", "an argument that nothing analysed gives")
 
 Model = Callable[["Run", Call], Value]
 EXPRESSIONS: dict[type, Callable[[Run, Any, Frame], Value]] = {}
@@ -91,6 +92,7 @@ class Run(Machine):
         self.launched_words = None if words is None else (main.path, *words)
         self._functions: dict[object, Any] = {}
         self._tuples: dict[object, Obj] = {}
+        self.joined: dict[Function, dict[str, Value]] = {}  # arguments of functions that take too many steps
         self.captured: dict[object, Any] = {}
 
     # --- walking --------------------------------------------------------------------------------------------
@@ -235,6 +237,8 @@ class Run(Machine):
             return self._field(atom, name, node, frame)
         if isinstance(atom, External):
             path = f"{atom.path}.{name}"
+            if path in self.modules:  # the folder of a module, without __init__.py
+                return (self.modules[path],)
             return CONSTANTS.get(path) or external(path)
         if isinstance(atom, Super):
             return self._of_super(atom, name, node, frame)
@@ -256,9 +260,11 @@ class Run(Machine):
         if found and ABSENT[0] not in held:
             return found
         if isinstance(obj.cls, External):
+            if found:
+                return found  # where it is not set, an error ended the path
             model = FOREIGN_FIELDS.get(obj.cls.path)
             special = model(self, obj, name) if model else None
-            return join(found, special if special is not None else (ForeignMethod(obj.cls.path, obj, name),))
+            return special if special is not None else (ForeignMethod(obj.cls.path, obj, name),)
         assert isinstance(obj.cls, Class)
         if name == "__class__":
             return (obj.cls,)

@@ -39,6 +39,7 @@ from enclave_addons.inference.python.program import SourceModule
 from enclave_addons.inference.python.run import MAX_EXACT, STATEMENTS, Run
 
 MAX_TURNS = 64  # of a while whose test is known each time
+MAX_TURNS_INSIDE = 256  # of known loops inside each other that make no interface
 _KEEP_FUNCTION = frozenset({
     "wraps", "lru_cache", "cache", "contextmanager", "asynccontextmanager", "override", "overload", "abstractmethod",
     "final", "no_type_check", "singledispatch", "jit", "njit", "beartype", "dataclass", "total_ordering", "unique",
@@ -193,13 +194,19 @@ def _for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> int:
         return run.execute(node.body, frame)
 
     exact = items.exact
-    if exact is not None and len(exact) <= MAX_EXACT:
+    if exact is not None and _is_followed(run, len(exact), node, frame):
         if not exact:
             run.dead.update(node.body)
         ways = run.each_element(len(exact), jumps, lambda index: body(exact[index]))
     else:
         ways = run.repeat(jumps, lambda: body(items.any_element() or ANY))
     return _after_loop(run, node, frame, jumps, ways)
+
+
+def _is_followed(run: Run, count: int, node: ast.stmt, frame: Frame) -> bool:
+    """Return whether a known loop is run turn by turn: not one deep in others that only computes something."""
+    few = count * run.turns <= MAX_TURNS_INSIDE or run.creates(frame.module.source, node)
+    return count <= MAX_EXACT and few
 
 
 def _after_loop(
@@ -219,7 +226,7 @@ def _while(run: Run, node: ast.While, frame: Frame) -> int:
     frame.loops.append(jumps)
     endless = isinstance(node.test, ast.Constant) and bool(node.test.value)
     ways = 0
-    for _ in range(MAX_TURNS):
+    for _ in range(MAX_TURNS if _is_followed(run, MAX_TURNS, node, frame) else 0):
         outcome = read_truth(run, run.evaluate(node.test, frame))
         if outcome is None or endless:
             break
@@ -228,7 +235,9 @@ def _while(run: Run, node: ast.While, frame: Frame) -> int:
                 run.dead.update(node.body)
             return _after_loop(run, node, frame, jumps, ways | NEXT)
         before = run.store.mark()
+        run.turns *= MAX_TURNS
         taken = run.turn(jumps, lambda: run.execute(node.body, frame))
+        run.turns //= MAX_TURNS
         ways |= taken & ~NEXT
         if not taken & NEXT:
             return _after_loop(run, node, frame, jumps, ways)
@@ -278,7 +287,7 @@ def _try(run: Run, node: ast.Try, frame: Frame) -> int:
     run.forks -= 1
     run.store.merge(outcomes)
     if not outcomes:
-        run.store.trail += list(seen.values())
+        run.store.keep(seen)
     if node.finalbody:
         last = run.execute(node.finalbody, frame)
         ways = ways if last & NEXT else last

@@ -27,6 +27,26 @@ GAPS: dict[str, tuple[str, list[str]]] = {
     "a ROS package that cannot be read": (
         NODE + "from moveit_helpers import Arm\nArm()\n", ["moveit_helpers.Arm() is of a ROS package"],
     ),
+    "a module in a folder without __init__.py that is not there": (
+        NODE + "import lib.command\nlib.command.use(node)\n", ["the node is handed to lib.command.use"],
+    ),
+    "parameters of generate_parameter_library": (
+        NODE + "from robot.robot_parameters import robot\nrobot.ParamListener(node)\n", [],
+    ),
+    "a listener of another library": (
+        NODE + "from robot.tools import robot\nrobot.ParamListener(node)\n", ["the node is handed to robot.tools"],
+    ),
+    "a name that is different at each start": (
+        "import uuid\nnode = rclpy.create_node(f'client_{str(uuid.uuid4())[:8]}')\n"
+        "node.create_publisher(String, 'a', 1)\n", [],
+    ),
+    "a topic that is different at each start": (
+        NODE + "import uuid\nnode.create_publisher(String, f'a_{uuid.uuid4().hex}', 1)\n", [],
+    ),
+    "a name that is different at each start and has no beginning of its own": (
+        "import uuid\nnode = rclpy.create_node('x' + uuid.uuid4().hex)\n"
+        "node.create_publisher(String, 'a', 1)\n", ["the name of this node is made at run time"],
+    ),
     "a library that knows nothing of ROS": (NODE + "import torch\ntorch.nn.Linear(1, 2)\n", []),
     "code made at run time": (NODE + "exec(input())\n", ["code made at run time"]),
     "an interface on something unknown": (
@@ -65,7 +85,8 @@ def test_a_program_with_more_than_ten_causes_is_one_gap(infer: Infer) -> None:
 TOO_MUCH: dict[str, str] = {
     "closures that call each other": "f = lambda x: x\n" + "f = (lambda g: lambda x: g(g(x)))(f)\n" * 40
     + "create = f\n",
-    "loops in loops": "".join(f"{' ' * n}for x{n} in range(60):\n" for n in range(6)) + "      pass\n",
+    "loops in loops": "".join(f"{' ' * n}for x{n} in range(60):\n" for n in range(6))
+    + "      node.create_publisher(String, f'a{x0}', 1)\n",
     "a number that grows": "n = 1\nwhile n < 10**9:\n    n += 1\n",
 }  # fmt: skip
 
@@ -87,6 +108,23 @@ def test_counted_steps_end_every_program(case: str, infer: Infer, monkeypatch: p
 def test_a_program_that_is_given_up_says_so_and_nothing_more(infer: Infer) -> None:
     (why,) = _whys(infer, NODE + TOO_MUCH["loops in loops"] + NODE.replace("'n'", "'m'"))
     assert why.startswith("this program was given up after")
+
+
+def test_loops_deep_in_others_that_only_compute_something_are_not_run_turn_by_turn(infer: Infer) -> None:
+    loops = "".join(f"{' ' * n}for x{n} in range(60):\n" for n in range(6)) + "      total = x5 * 2\n"
+    assert _whys(infer, loops + NODE) == []
+
+
+def test_callbacks_that_start_each_other_with_growing_numbers_come_to_an_end(infer: Infer) -> None:
+    program = (
+        "class A(Node):\n"
+        "    def __init__(self):\n        super().__init__('a')\n        self.again(1)\n"
+        "    def again(self, wait):\n"
+        "        self.create_publisher(String, 'a', 1)\n"
+        "        self.create_timer(wait, lambda: self.again(wait * 2))\n"
+        "rclpy.spin(A())\n"
+    )
+    assert _whys(infer, program) == []
 
 
 def test_a_mistake_of_the_analyser_is_a_gap_of_that_program_alone(

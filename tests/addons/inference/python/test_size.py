@@ -8,7 +8,7 @@ import pytest
 
 from enclave_addons import inference
 
-LINES = {"kernel": 1_250, "python": 5_250, "models": 275}
+LINES = {"kernel": 1_285, "python": 5_315, "models": 275}
 
 
 @pytest.mark.parametrize("room", LINES)
