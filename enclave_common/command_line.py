@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -17,16 +18,16 @@ from typing import Any, NoReturn, Protocol
 from enclave_common import VERSION
 from enclave_common.add_ons import add_ons
 from enclave_common.dependencies import missing_dependency
-from enclave_common.terminal import OutputError, quoted
-from enclave_common.words import did_you_mean
+from enclave_common.terminal import OutputError, choose_colour, quoted
+from enclave_common.words import counted, did_you_mean
 
 _INVALID_CHOICE = re.compile(r".*invalid choice: '([^']*)' \(choose from (.*)\)$", re.DOTALL)
 
 
 Kind = Mapping[str, Any]
 Option = tuple[str, Kind, str]
-"""As the help shows it, with its metavar (a positional by its name); what it takes, in argparse's words; what it is
-for."""
+"""An option in three parts: as the help shows it, with its metavar (a positional by its name); what it takes, in
+argparse's words; what it is for. A flag in brackets, as in ``--new (--old) FILE``, is understood and never shown."""
 
 
 def given_path(text: str) -> Path:
@@ -102,7 +103,8 @@ def add_options(group: OptionGroup, options: Iterable[Option]) -> list[argparse.
     """Add each to a parser or group; return argparse's actions, with what is in a kind beside argparse's words."""
     added = []
     for written, kind, text in options:
-        words = written.split()
+        words = [word for word in written.split() if not word.startswith("(")]
+        aliases = [word[1:-1] for word in written.split() if word.startswith("(")]
         flags = [word for word in words if word.startswith("-")] or words[:1]
         metavar = {"metavar": words[-1]} if len(words) > len(flags) else {}
         settings = {**metavar, **kind, "help": text}
@@ -111,6 +113,10 @@ def add_options(group: OptionGroup, options: Iterable[Option]) -> list[argparse.
         for name, note in notes.items():
             setattr(action, name, note)
         added.append(action)
+        if aliases:
+            added.append(
+                group.add_argument(*aliases, **{**settings, "dest": action.dest, "help": argparse.SUPPRESS})
+            )
     return added
 
 
@@ -135,18 +141,40 @@ class CommandParser(argparse.ArgumentParser):
         self.arguments: list[argparse.Action] = []
         self.verbs: dict[str, CommandParser] = {}
         self.verb_dest = ""
+        self._daily: frozenset[str] | None = None
+        self._left_out: Counter[str] = Counter()
         texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
         form = {"allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter}
         super().__init__(**{**form, **settings, **texts})
 
+    def show_first(self, daily: Iterable[str], everything: Callable[[], CommandParser]) -> None:
+        """Let the help show only what is used daily, and add ``--help-all``. To be called before anything is added.
+
+        Args:
+            daily: Long options and verbs.
+            everything: Builds the parser whose help shows all of them.
+        """
+        self._daily = frozenset(daily)
+        self.add_argument(
+            "--help-all", action=_HelpAll, nargs=0, const=everything, help="show everything and exit"
+        )
+
     def add_options(self, options: Iterable[Option], title: str = "") -> None:
         """Add each, those with a ``title`` as a group of the help."""
-        self.arguments += add_options(self.add_argument_group(title) if title else self, options)
+        self.arguments += add_options(self.add_argument_group(title) if title else self, self._shown(options))
+
+    def _shown(self, options: Iterable[Option]) -> Iterator[Option]:
+        for written, kind, text in options:
+            flags = {word for word in written.split() if word.startswith("-")}
+            if self._daily is not None and flags and not flags & self._daily and text != argparse.SUPPRESS:
+                self._left_out["option"] += 1
+                text = argparse.SUPPRESS
+            yield written, kind, text
 
     def add_one_of(self, options: Iterable[Option], title: str = "") -> None:
         """Add options of which one at most may be given."""
         group = self.add_argument_group(title) if title else self
-        self.arguments += add_options(group.add_mutually_exclusive_group(), options)
+        self.arguments += add_options(group.add_mutually_exclusive_group(), self._shown(options))
 
     def add_verbs(self, dest: str = "verb") -> None:
         """Prepare for ``add_verb``; the parsed value ``dest`` names the verb."""
@@ -164,6 +192,9 @@ class CommandParser(argparse.ArgumentParser):
             "description": description.rstrip(),
             "epilog": f"{mark}{status}" if mark else None,
         }
+        if self._daily is not None and name not in self._daily:
+            self._left_out["verb"] += 1
+            del head["help"]  # argparse then leaves it out of the list
         self.verbs[name] = self._add_parser(name, **{**head, **settings})
         return self.verbs[name]
 
@@ -221,7 +252,11 @@ class CommandParser(argparse.ArgumentParser):
     def format_help(self) -> str:
         """Return the help, below the usage on one line."""
         self.usage = self.usage or self._one_usage()
-        return super().format_help()
+        text = super().format_help()
+        if not self._left_out:
+            return text
+        more = " and ".join(counted(number, f"more {what}") for what, number in self._left_out.items())
+        return f"{text}\n{more}: {self.prog} --help-all\n"
 
     def _one_usage(self) -> str:
         """Return the command with the options that it cannot do without, and its arguments."""
@@ -251,6 +286,14 @@ class CommandParser(argparse.ArgumentParser):
         if choice := _INVALID_CHOICE.match(message):
             return did_you_mean(choice[1], re.findall(r"[^\s',]+", choice[2]))
         return ""
+
+
+class _HelpAll(argparse.Action):
+    """Print the help of the whole command and exit. ``const`` builds the parser that shows everything."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        self.const().print_help()
+        parser.exit()
 
 
 def _in_usage(action: argparse.Action) -> str:
@@ -294,11 +337,20 @@ VERBOSITY: tuple[Option, ...] = (
 )
 
 
+_MACHINE_FORMATS = frozenset({"json", "sarif", "policy", "html", "markdown", "dot", "mermaid", "v2"})
+COLOUR: Option = (
+    "--color",
+    one_of("auto", "always", "never"),
+    "colours: on a terminal (auto; NO_COLOR is respected)",
+)
+
+
 def add_verbosity(parser: CommandParser) -> None:
     """Add ``-q`` and ``-v`` to a command, or to each of its verbs."""
     for each in parsers(parser):
-        if not each.verbs:
+        if not each.verb_dest:
             each.add_one_of(VERBOSITY)
+            each.add_options((COLOUR,))
 
 
 def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -> int:
@@ -389,6 +441,8 @@ def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> Comm
     given = vars(parser.parse_intermixed_args(words))
     known = {name: value for name, value in defaults.items() if value is not argparse.SUPPRESS}
     written = frozenset(name for name, value in given.items() if name in defaults and value is not None)
+    plain = given.get("format", known.get("format")) in _MACHINE_FORMATS
+    choose_colour("never" if plain else given.get("color", "auto"))
     return CommandLine(argparse.Namespace(**{**chosen, **known, **given}), written, tuple(parser.arguments))
 
 

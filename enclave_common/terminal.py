@@ -19,6 +19,8 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, redire
 from os import PathLike
 from typing import Any, TextIO, cast
 
+from enclave_common.colour import coloured, wants_colour
+
 _PERHAPS_UNSAFE = re.compile(r"[^ -~\n\t]")
 
 
@@ -87,12 +89,21 @@ def stdout_is_for_the_plan() -> AbstractContextManager[Any]:
     return redirect_stdout(sys.stderr)
 
 
+def choose_colour(mode: str) -> None:
+    """Set for the rest of ``safe_output`` whether its streams have colours: ``auto``, ``always`` or ``never``."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, _SafeText):
+            stream.colour = wants_colour(mode, cast("TextIO", stream))
+
+
 class _SafeText:
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
+        self.colour = wants_colour("auto", stream)
 
     def write(self, text: str) -> int:
-        _write(self._stream, printable_lines(text))
+        safe = printable_lines(text)
+        _write(self._stream, coloured(safe) if self.colour else safe)
         return len(text)
 
     def flush(self) -> None:

@@ -278,7 +278,7 @@ def _hardening_of(needs: Needs) -> Iterator[str]:
 
 
 def _expiry(deployment: Deployment, keystore: str, setup: tuple[str, ...]) -> str:
-    command = ["secure-keystore", "status", keystore, "--within", _EXPIRES_SOON]
+    command = ["secure-keystore", "status", keystore, "--expiring-within", _EXPIRES_SOON]
     script = " && ".join((*(f". {shlex.quote(file)}" for file in setup), f"exec {shlex.join(command)}"))
     lines = (
         "[Unit]",

@@ -66,7 +66,8 @@ SECURITY: tuple[Option, ...] = (
     ("--valid-for TIME", TEXT, "validity of new certificates and permissions, such as 90d"),
     ("--no-revoke", FLAG,
      "if rights are removed: do not revoke the previous certificate (it is usable until it expires)"),
-    ("--warn-expiry TIME", {"default": "30d"}, "warn when an enclave expires within this time (default: 30d)"),
+    ("--expiring-within (--warn-expiry) TIME", {"default": "30d"},
+     "warn when an enclave expires within this time (default: 30d)"),
     ("--compatible-subjects", FLAG,
      "certificate subjects as SROS2 writes them; see secure-keystore verify for the exposure"),
     ("--log-security DIR", PATH,
@@ -170,20 +171,25 @@ DENIALS: tuple[Option, ...] = (
 )
 
 
-def build_parser() -> CommandParser:
-    """Build the parser, its options grouped by the question they answer."""
-    parser = CommandParser(
-        prog="secure-launch",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-    )
+DAILY = (
+    "--secure", "--keystore", "--dry-run", "--explain", "--show-args", "--learn", "--audit", "--watch",
+    "--nodl", "--source", "--enclave-scope", "--prefix",
+)  # fmt: skip
+"""Options that ``--help`` shows; ``--help-all`` shows the others."""
+
+
+def build_parser(*, first: bool = False) -> CommandParser:
+    """Build the parser, its options grouped by the question they answer. ``first``: its help is for daily use."""
+    parser = CommandParser(prog="secure-launch", description=DESCRIPTION, epilog=EPILOG)
+    if first:
+        parser.show_first(DAILY, build_parser)
     words = "PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
     kind = {"nargs": "*", "metavar": words, "completer": launch_words}
     parser.add_options((("words", kind, "a launch file, and its launch arguments"),))
     add_version(parser)
     add_verbosity(parser)
-    parser.arguments += add_security_options(parser.add_argument_group("security"))
     for title, options in (
+        ("security", SECURITY),
         ("permissions", POLICY),
         ("looking without starting", (*LOOKING, *WRITTEN)),
         ("evaluating the launch file", EVALUATION),
@@ -192,6 +198,9 @@ def build_parser() -> CommandParser:
         *((mode.TITLE, mode.OPTIONS) for mode in modes()),
     ):
         parser.add_options(options, title)
+        if options is SECURITY:
+            parser.add_one_of(PASSPHRASE, "passphrase of the CA keys")
+            parser.add_options(LATE, "actions that a plan cannot foresee")
     return parser
 
 

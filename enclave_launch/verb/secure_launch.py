@@ -58,7 +58,7 @@ from nodl.ament_index import search_prefixes
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own); return the exit status."""
     with safe_output():
-        parser = build_parser()
+        parser = build_parser(first=True)
         complete(parser)
         line = read_command_line(parser, argv)
         return guarded("secure-launch", lambda: _main(line), EnclaveLaunchError, ProjectError)

@@ -117,7 +117,7 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str, compan
             print(f"secure-launch: {printable(text)}", file=sys.stderr)
     repaired = (*repair_notices(launch), *launch.report.warnings, *launch.handshakes)
     gaps = launch.zenoh.gaps if launch.zenoh is not None else ()
-    warn(*repaired, *gaps, *expiry_notices(launch, options.warn_expiry))
+    warn(*repaired, *gaps, *expiry_notices(launch, options.expiring_within))
     if options.provision_only:
         return 0
     deadline = renewal_deadline(launch, utc_now()) if options.restart_expiring else None
@@ -159,7 +159,7 @@ _NEW_KEYSTORE = "governance signed"
 def security_options(options: argparse.Namespace) -> SecurityOptions:
     """Return the options of provisioning; raises ``UsageError`` for a value that an option does not take."""
     with translated(InvalidInputError, UsageError):
-        parse_duration(options.warn_expiry)  # used after provisioning, refused before
+        parse_duration(options.expiring_within)  # used after provisioning, refused before
         keystore = _provision_options(options)
     folder = options.log_security
     if folder is not None:

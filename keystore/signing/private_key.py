@@ -48,7 +48,7 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
     encrypted = b"ENCRYPTED" in pem
     if encrypted and passphrase is None:
         raise SigningUnavailableError(
-            f"{place} is encrypted; give its passphrase with --passphrase-file, -fd or -env"
+            f"{place} is encrypted; give its passphrase with --ca-passphrase-file, -fd or -env"
         )
     if encrypted and passphrase is not None:
         passphrase.value()  # reports what is wrong with it

@@ -241,7 +241,7 @@ def _self_signed(role: Role, options: CreateOptions, key: PrivateKey) -> Authori
 
 def _passphrase(options: CreateOptions) -> Secret | None:
     if options.encrypt_ca_keys and options.access.passphrase is None:
-        raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
+        raise InvalidInputError("encrypting CA keys needs a passphrase: --ca-passphrase-file, -fd or -env")
     if options.access.passphrase is not None:
         options.access.passphrase.value()  # reports what is wrong with it
     return options.access.passphrase

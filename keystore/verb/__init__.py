@@ -35,7 +35,7 @@ VERBS = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; errors become one line on stderr and an exit status, and nothing is printed twice."""
     with safe_output():
-        parser = build_parser()
+        parser = build_parser(first=True)
         complete(parser)
         line = read_command_line(parser, argv)
         return guarded("secure-keystore", lambda: _run(line), KeystoreError, ProjectError)
@@ -76,13 +76,27 @@ def _is_optional(line: CommandLine) -> bool:
     return any(action.dest == "keystore" and action.option_strings for action in line.actions)
 
 
-def build_parser() -> CommandParser:
-    """Build one subparser for each verb, described by the head of its file."""
+DAILY = ("verify", "status", "renew")
+"""Verbs that ``--help`` shows; ``--help-all`` shows the others."""
+EPILOG = """\
+examples:
+  secure-keystore verify ks              is everything in it as it should be, and how to repair what is not
+  secure-keystore status ks              what expires when
+  secure-keystore renew ks               renew what expires soon
+  secure-launch --secure --keystore ks PACKAGE LAUNCH_FILE     makes the keystore and its enclaves
+"""
+
+
+def build_parser(*, first: bool = False) -> CommandParser:
+    """Build one subparser for each verb, described by the head of its file. ``first``: its help is for daily use."""
     parser = CommandParser(
         prog="secure-keystore",
         description="Create, check, renew and deploy SROS2 keystores. What was interrupted is completed by the same "
         "command.",
+        epilog=EPILOG,
     )
+    if first:
+        parser.show_first(DAILY, build_parser)
     add_version(parser)
     parser.add_verbs()
     for verb, module in parser.add_verb_modules("keystore.verb", VERBS):

@@ -67,7 +67,7 @@ LOCK: Option = (
     "--lock-timeout TIME", {**TIME, "default": DEFAULT_TIMEOUT},
     "how long to wait for another run (30s)",
 )  # fmt: skip
-WITHIN: Option = ("--within TIME", {"default": "30d"}, "what counts as soon (30d)")
+WITHIN: Option = ("--expiring-within (--within) TIME", {"default": "30d"}, "what counts as soon (30d)")
 DOMAINS: Option = ("--domain-id IDS", TEXT, "domains of the permissions (default: the governance's)")
 """Read by ``domains``."""
 REVOKE_OLD: Option = ("--revoke-old", FLAG, "also revoke the certificates these enclaves had before")
@@ -85,9 +85,9 @@ SUBJECTS: tuple[Option, ...] = (
 """How certificate subjects are written."""
 SIGNING: tuple[SecretOptions, ...] = (
     SecretOptions("passphrase of the CA keys", (
-        ("--passphrase-file FILE", PATH, "file that holds it"),
-        ("--passphrase-fd N", {"type": int}, "open descriptor to read it from"),
-        ("--passphrase-env NAME", TEXT, "environment variable that holds it"),
+        ("--ca-passphrase-file (--passphrase-file) FILE", PATH, "file that holds it"),
+        ("--ca-passphrase-fd (--passphrase-fd) N", {"type": int}, "open descriptor to read it from"),
+        ("--ca-passphrase-env (--passphrase-env) NAME", TEXT, "environment variable that holds it"),
     )),
     SecretOptions("PIN of a PKCS#11 token with the CA keys", (
         ("--pin-file FILE", PATH, "file that holds it"),
@@ -136,7 +136,7 @@ def domains(arguments: argparse.Namespace) -> Domains | None:
 def access(arguments: argparse.Namespace) -> CaAccess:
     """Return how CA keys are opened, from the options of ``SIGNING``."""
     given = vars(arguments)
-    passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
+    passphrase = Secret(given["ca_passphrase_file"], given["ca_passphrase_fd"], given["ca_passphrase_env"])
     pin = Secret(file=given["pin_file"], variable=given["pin_env"])
     return CaAccess(passphrase=passphrase if passphrase.is_given else None, pin=pin if pin.is_given else None)
 

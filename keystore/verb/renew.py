@@ -1,6 +1,6 @@
 """Renew what expires soon, repair what is exposed, or replace the CAs.
 
-Without enclaves: all certificates that expire within --within, with their permissions, the CRL, and the
+Without enclaves: all certificates that expire within --expiring-within, with their permissions, the CRL, and the
 repairs that verify names. With enclaves: those. --ca start|switch|finish replaces CAs in three steps, to
 be deployed one after the other. Fast DDS then trusts old and new side by side; Cyclone DDS reads only the
 first CA of a file, so its participants must take 'switch' together.
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 OPTIONS: common.Table = (
     common.KEYSTORE,
     ("enclaves", {**common.ENCLAVES, "nargs": "*"}, "enclaves to renew in any case"),
-    ("--within TIME", {"default": "30d"}, "what expires sooner is renewed (30d)"),
+    ("--expiring-within (--within) TIME", {"default": "30d"}, "what expires sooner is renewed (30d)"),
     ("--all", FLAG, "renew every enclave"),
     ("--new-keys", FLAG, "new private keys too, not only certificates"),
     common.REVOKE_OLD,
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
     wanted = RenewOptions(
-        within=parse_duration(arguments.within),
+        within=parse_duration(arguments.expiring_within),
         everything=arguments.all,
         new_keys=arguments.new_keys,
         revoke_old=arguments.revoke_old,

@@ -35,7 +35,7 @@ OPTIONS: common.Table = (
 def run(arguments: argparse.Namespace) -> int:
     """Print what ends when. Returns 3 where something ends soon, 4 where it has ended."""
     report = status(arguments.keystore)
-    due = report.due(parse_duration(arguments.within))
+    due = report.due(parse_duration(arguments.expiring_within))
     lines = _lines(report, report.expiries if arguments.all else due)
     common.print_answer(arguments, _json(report, due), lines)
     if any(not one.is_valid(report.now) for one in due):

@@ -46,7 +46,7 @@ class Verb(NamedTuple):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     with safe_output():
-        parser = build_parser()
+        parser = build_parser(first=True)
         complete(parser)
         line = read_command_line(parser, argv)
         return guarded(f"secure-nodl {line.options.verb}", lambda: _run(line), NoDLError, ProjectError)
@@ -64,13 +64,26 @@ def _run(line: CommandLine) -> int:
         raise NoDLError(f"{error.filename}: {error.strerror}") from error
 
 
-def build_parser() -> CommandParser:
-    """Build one subparser for each verb."""
+DAILY = ("infer",)
+"""Verbs that ``--help`` shows; ``--help-all`` shows the others."""
+EPILOG = """\
+examples:
+  secure-nodl infer my_package               what its nodes publish, subscribe, serve and call
+  secure-nodl infer src/my_package -o nodl   the same as manifests, to complete by hand
+
+exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage
+"""
+
+
+def build_parser(*, first: bool = False) -> CommandParser:
+    """Build one subparser for each verb. ``first``: its help is for daily use."""
     parser = CommandParser(
         prog="secure-nodl",
         description="NoDL manifests: what a ROS 2 node publishes, subscribes, serves and calls.",
-        epilog="exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage",
+        epilog=EPILOG,
     )
+    if first:
+        parser.show_first(DAILY, build_parser)
     add_version(parser)
     parser.add_verbs(dest="verb")
     for verb, module in parser.add_verb_modules("nodl.verb", VERBS):

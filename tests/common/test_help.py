@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from enclave_addons.review import verb as secure_plan
-from enclave_common.command_line import CommandParser, Option, parsers
+from enclave_common.command_line import CommandParser, Option, parsers, read_command_line
 from enclave_launch.verb import options as secure_launch
 from keystore import verb as secure_keystore
 from nodl import verb as secure_nodl
@@ -68,6 +68,32 @@ def test_examples_keep_their_lines_and_paragraphs_are_filled() -> None:
     assert shown.endswith("\n\nexit status: 0 good\n")
 
 
+def test_the_first_help_has_eight_verbs_and_twelve_options_and_says_where_the_rest_is() -> None:
+    shown = [command.build_parser(first=True).format_help() for command in COMMANDS]
+    verbs = [name for text in shown for name in re.findall(r"^    ([a-z][a-z-]+) ", text, re.M)]
+    assert len(verbs) == 8
+    options = set(re.findall(r"^  (?:-\w, )?(--[a-z][a-z-]+)", shown[0], re.M))
+    assert len(options - {"--help", "--help-all", "--version", "--quiet", "--verbose"}) == 12
+    for command, text in zip(("launch", "plan", "keystore", "nodl"), shown, strict=True):
+        assert text.rstrip().endswith(f": secure-{command} --help-all") and "\nexamples:\n" in text
+
+
+def test_the_whole_help_has_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in COMMANDS:
+        with pytest.raises(SystemExit) as ended:
+            command.build_parser(first=True).parse_args(["--help-all"])
+        assert ended.value.code == 0
+        assert capsys.readouterr().out == command.build_parser().format_help()
+
+
+def test_an_option_has_one_name_and_an_earlier_one_is_understood() -> None:
+    shown = help_of("secure-keystore", "status")
+    assert "--expiring-within TIME" in shown and "--within " not in shown
+    for word in ("--expiring-within", "--within"):
+        line = read_command_line(secure_keystore.build_parser(), ["status", "ks", word, "5d"])
+        assert line.options.expiring_within == "5d"
+
+
 def test_every_help_has_the_same_headings() -> None:
     for parser in every_parser():
         shown = parser.format_help()
@@ -86,13 +112,13 @@ def test_every_verb_is_a_sentence_in_the_list_of_its_command() -> None:
 def test_a_verb_of_secure_plan_names_the_options_of_a_launch_once() -> None:
     shown = help_of("secure-plan", "check")
     assert shown.count("--nodl") == 1
-    assert "options described by secure-launch --help:" in shown
+    assert "options described by secure-launch --help-all:" in shown
     assert "--nodl FILE|DIR" in secure_launch.build_parser().format_help()
 
 
 def test_a_verb_of_secure_keystore_leaves_common_options_to_create() -> None:
     assert "options described by secure-keystore create --help:" in help_of("secure-keystore", "renew")
-    assert "--passphrase-fd N" in help_of("secure-keystore", "create")
+    assert "--ca-passphrase-fd N" in help_of("secure-keystore", "create")
 
 
 def test_each_exit_status_of_a_help_is_in_the_table() -> None:

@@ -38,7 +38,7 @@ OPTIONS: common.Table = (
 def run(arguments: argparse.Namespace) -> int:
     """Print the table. Returns 1 when a host is not as it should be."""
     report = fleet_status(
-        arguments.places, keystore=arguments.keystore, within=parse_duration(arguments.within)
+        arguments.places, keystore=arguments.keystore, within=parse_duration(arguments.expiring_within)
     )
     common.print_answer(arguments, _json(report), _lines(report))
     if any(one.ended for one in report.hosts):

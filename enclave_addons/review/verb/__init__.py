@@ -33,11 +33,28 @@ revisions, ask which enclave can influence which, place it on hosts, export it t
 A plan is a launch file, given as to secure-launch, or the JSON that secure-launch --dry-run --format json printed
 (a file that ends in .json).
 """
+EPILOG = """\
+examples:
+  secure-plan init                                            an enclaves.yaml for this workspace
+  secure-plan doctor demo_nodes talker_listener.launch.xml    what is missing before a secured start
+  secure-plan check demo_nodes talker_listener.launch.xml     what is wrong or worth a look
+  secure-plan diff main: demo_nodes talker_listener.launch.xml
+  secure-plan report demo_nodes talker_listener.launch.xml -o report.html
+"""
 
 
-def build_parser() -> CommandParser:
-    """Build the parser: a subparser for each verb, described by the head of its file."""
-    parser = CommandParser(prog="secure-plan", description=DESCRIPTION)
+DAILY = ("doctor", "check", "diff", "report")
+"""Verbs that ``--help`` shows; ``--help-all`` shows the others."""
+
+
+def build_parser(*, first: bool = False) -> CommandParser:
+    """Build the parser: a subparser for each verb, described by the head of its file.
+
+    With ``first`` the help is for daily use.
+    """
+    parser = CommandParser(prog="secure-plan", description=DESCRIPTION, epilog=EPILOG)
+    if first:
+        parser.show_first(DAILY, build_parser)
     add_version(parser)
     parser.add_verbs()
     for verb, module in parser.add_verb_modules("enclave_addons.review.verb", VERBS):
@@ -46,7 +63,7 @@ def build_parser() -> CommandParser:
             verb.add_options(options, title)
         if getattr(module, "PLANS", True):
             verb.add_options(RESOLVING)
-            verb.fold(RESOLVING, "secure-launch --help")
+            verb.fold(RESOLVING, "secure-launch --help-all")
             # A launch prefix is only of use where something is started.
             verb.set_defaults(launch_prefix=None, launch_prefix_filter=None)
     add_verbosity(parser)
@@ -56,7 +73,7 @@ def build_parser() -> CommandParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
     with safe_output():
-        parser = build_parser()
+        parser = build_parser(first=True)
         complete(parser)
         line = read_command_line(parser, argv)
         return guarded("secure-plan", lambda: _run(line), EnclaveLaunchError, ProjectError)

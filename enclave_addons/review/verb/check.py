@@ -40,7 +40,7 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
     plan = read_plan(options.words, options)
-    found = judged(plan, options.expect, options.keystore, options.within, project=options.project)
+    found = judged(plan, options.expect, options.keystore, options.expiring_within, project=options.project)
     sys.stdout.write(_text(plan, found, options))
     open_ones = [finding for finding, accepted in found if accepted is None]
     return 1 if any(options.strict or finding.severity == "error" for finding in open_ones) else 0

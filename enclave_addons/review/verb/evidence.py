@@ -93,7 +93,7 @@ def _examine(options: argparse.Namespace) -> Examined:
     document = read_document(options.words, options)
     plan = DryRun(**document)
     components = _bill_of_materials(options.sbom) if options.sbom is not None else None
-    found = judged(plan, options.expect, keystore, options.within, now, options.project)
+    found = judged(plan, options.expect, keystore, options.expiring_within, now, options.project)
     ends = endings(keystore, now=now) if keystore is not None else None
     root = os.getcwd()
     contents = report_contents(plan, found, title=" ".join(options.words), root=root, endings=ends)

@@ -37,7 +37,7 @@ EXPECT: Option = (
     PATH,
     f"rules beside those of enclaves.yaml (default: {EXPECTATIONS}, if it exists)",
 )
-WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what expires soon (30d)")
+WITHIN: Option = ("--expiring-within (--within) TIME", {"default": DEFAULT_MARGIN}, "what expires soon (30d)")
 
 
 def judged(

@@ -13,10 +13,11 @@ from pydantic import ValidationError
 
 from enclave_common.command_line import Kind, Option, one_of
 from enclave_common.files import read_text
-from enclave_common.terminal import stdout_is_for_the_plan
+from enclave_common.terminal import progress, stdout_is_for_the_plan
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 from enclave_launch.flow import resolve
+from enclave_launch.options import ResolveOptions
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.verb.completion import launch_words
 from enclave_launch.verb.options import EVALUATION, POLICY, resolve_options
@@ -80,10 +81,14 @@ def _planned(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, 
     here = os.getcwd()
     try:
         with stdout_is_for_the_plan():
-            plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))
+            plan = resolve(target.launch_file, target.arguments, options=_resolving(options))
     finally:
         os.chdir(here)  # code of the launch file may have changed it, and our options are relative to it
     return plan_document(plan)
+
+
+def _resolving(options: argparse.Namespace) -> ResolveOptions:
+    return resolve_options(options)._replace(progress=progress("analysing", quiet=options.quiet))
 
 
 def _saved(file: Path) -> tuple[Mapping[str, Any], DryRun]:
