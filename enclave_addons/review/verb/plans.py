@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def _planned(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, 
 
 
 def _resolving(options: argparse.Namespace) -> ResolveOptions:
-    return resolve_options(options)._replace(progress=progress("analysing", quiet=options.quiet))
+    return replace(resolve_options(options), progress=progress("analysing", quiet=options.quiet))
 
 
 def _saved(file: Path) -> tuple[Mapping[str, Any], DryRun]:
