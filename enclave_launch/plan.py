@@ -96,7 +96,8 @@ class PlannedProcess(NamedTuple):
     """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes.
 
     ``origin``: where their interfaces come from; ``doubt``: why they may not be those of the installed version;
-    ``descriptions``: all that were compared, if there are several.
+    ``descriptions``: all that were compared, if there are several. ``started``: of a command of ``ros2``, the node that
+    it is or starts.
     """
 
     process: ResolvedProcess
@@ -109,11 +110,12 @@ class PlannedProcess(NamedTuple):
     refusals: tuple[Diagnostic, ...] = ()
     domain: int = 0
     middleware: str = DEFAULT_MIDDLEWARE
+    started: ResolvedProcess | None = None
 
     @property
     def program(self) -> str:
         """Return ``package/executable``, or the executable alone."""
-        return self.process.program
+        return (self.started or self.process).program
 
     @property
     def location(self) -> SourceLocation:
@@ -122,16 +124,16 @@ class PlannedProcess(NamedTuple):
     @property
     def name(self) -> str | None:
         """Return the node name: launch's, else the manifest's, else launch's placeholder."""
-        if self.process.name == UNSPECIFIED_NODE_NAME and self.nodes:
-            return self.nodes[0].original_name
-        return self.process.name
+        name = (self.started or self.process).name
+        return self.nodes[0].original_name if name == UNSPECIFIED_NODE_NAME and self.nodes else name
 
     @property
     def fqn(self) -> str | None:
         """Return the fully qualified name as launch shows it, with the placeholder replaced by a known name."""
-        if self.process.fqn is None or self.name is None:
-            return self.process.fqn
-        return self.process.fqn.replace(UNSPECIFIED_NODE_NAME, self.name)
+        fqn = (self.started or self.process).fqn
+        if fqn is None or self.name is None:
+            return fqn
+        return fqn.replace(UNSPECIFIED_NODE_NAME, self.name)
 
 
 class PlannedComponent(NamedTuple):

@@ -48,8 +48,9 @@ from enclave_launch.plan import (
     nodes_of,
 )
 from enclave_launch.policy import DerivedPolicy, RunningNode
+from enclave_launch.policy.command_nodes import commands_of
 from enclave_launch.ros_rules.parameter_value import type_name
-from enclave_launch.ros_rules.ros2_command import instead_of, participant_command
+from enclave_launch.ros_rules.ros2_command import instead_of
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.subject import common_name
 
@@ -79,10 +80,8 @@ def problems(
 
 
 def _ros2_command(item: PlannedProcess) -> tuple[str, ...] | None:
-    process = item.process
-    if item.enclave is not None or process.kind != "executable":
-        return None
-    return participant_command(process.cmd[len(process.prefix) :], shell=process.shell)
+    commands = commands_of(item.process) if item.enclave is None else ()
+    return commands[0] if commands else None
 
 
 def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:

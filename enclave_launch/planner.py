@@ -25,6 +25,7 @@ from enclave_launch.plan import (
     nodes_of,
 )
 from enclave_launch.policy import derive_policy
+from enclave_launch.policy.command_nodes import interfaces_of_command, only_command, program_of_command
 from enclave_launch.policy.launcher import launcher_node
 from enclave_launch.policy.running_node import (
     Role,
@@ -102,7 +103,7 @@ def _admitted(planned: PlannedProcess, options: AdmissionOptions) -> PlannedProc
 
 def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope) -> PlannedProcess:
     if process.kind == "executable":
-        return PlannedProcess(process, assign_enclave(process, scope), ())
+        return _plan_executable(process, lookup, scope)
     found = lookup(process, None)
     if isinstance(found, Missing):
         unnamed = scope is EnclaveScope.NODE and process.name == UNSPECIFIED_NODE_NAME
@@ -155,7 +156,7 @@ class _Profiles:
 
     def described_process(self, item: PlannedProcess) -> PlannedProcess:
         """Return the process with the nodes that the policy describes."""
-        process = item.process
+        process = item.started or item.process
         if item.missing is None or item.enclave is None or process.kind == "executable":
             return item
         path, role = item.enclave.path, _role(process)
@@ -219,6 +220,24 @@ def _is_its_own(node: RunningNode, interface: NodeInterface) -> bool:
         and has_wildcard(written[1] or "")
         and fnmatchcase(node.name, written[1] or "")
     )
+
+
+def _plan_executable(
+    process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope
+) -> PlannedProcess:
+    """Plan a command of ``ros2`` as the node that it is, or starts; any other program as its attributes say."""
+    command = only_command(process)
+    if command is not None and (program := program_of_command(process, command)) is not None:
+        return _plan_process(program, lookup, scope)._replace(process=process, started=program)
+    if command is None or (known := interfaces_of_command(process, command)) is None:
+        return PlannedProcess(process, assign_enclave(process, scope), ())
+    started, interfaces = known
+    enclave = assign_enclave(
+        started, scope, interfaces[0].name and interfaces[0].name.removesuffix(RANDOM_ENDING)
+    )
+    path = enclave.path if enclave else "/"
+    nodes = tuple(node_of_process(started, interface, path, "node") for interface in interfaces)
+    return PlannedProcess(process, enclave, nodes, started=started)
 
 
 def _role(process: ResolvedProcess) -> Role:

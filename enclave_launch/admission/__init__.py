@@ -133,7 +133,7 @@ KEEPERS: dict[str, Keeper] = {
 _SERVER = "a server that runs already starts the program, with its own environment"
 _OTHER_MACHINE = "the program starts elsewhere, with another environment"
 _ROOT = "it starts the program for another user, with a cleaned environment"
-_SHELL = "a shell script may change the environment"
+_SHELL = "a shell script may change the environment; source its files before the launch, and write the program alone"
 CHANGERS: dict[str, str] = {
     "env": "it exists to change the environment; write <env name=... value=.../> below the element instead",
     **dict.fromkeys(("sudo", "su", "doas", "pkexec", "runuser", "setpriv", "gosu", "chpst"), _ROOT),

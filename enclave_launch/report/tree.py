@@ -56,7 +56,7 @@ def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) ->
 
 def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     process = item.process
-    what = process.program
+    what = item.program
     names = shown_fqn(item)
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""

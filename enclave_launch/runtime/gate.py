@@ -5,11 +5,13 @@ A refusal says what was planned, what came instead, and why that can be.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple, Protocol, TypeVar
 
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.policy.command_nodes import commands_of
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from nodl.ros_arguments import parse_ros_arguments
 
@@ -77,6 +79,7 @@ def permission_facts(item: ResolvedProcess | ResolvedComponent) -> Mapping[str, 
         "--enclave": item.enclave.argument,
         "use_sim_time": item.parameters.get("use_sim_time"),  # subscribes /clock
         "launch prefix": item.prefix,
+        "ros2 commands": tuple(map(shlex.join, commands_of(item))),
         "middleware": item.final_environment.get("RMW_IMPLEMENTATION"),
         "domain": item.final_environment.get("ROS_DOMAIN_ID"),
     }
@@ -114,7 +117,8 @@ class PlannedGate:
     def ensure(self, process: ResolvedProcess) -> StartAdditions:
         if identity(process) in self._processes:
             return self._provider.ensure(process)
-        if process.kind == "executable" and process.enclave.attribute is process.enclave.argument is None:
+        asks_for_none = process.enclave.attribute is process.enclave.argument is None
+        if process.kind == "executable" and asks_for_none and not commands_of(process):
             return self._provider.ensure_late(process)  # no ROS process by the launch file: nothing to sign
         named = f"{process.program} ({process.fqn})" if process.fqn else process.program
         what = f"{named} at {process.location}"
