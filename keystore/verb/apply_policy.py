@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     common.warn(document.warnings, arguments)
     wildcards = document.policy.wildcards()
     granted = (
-        f"enclave {path} is granted by wildcard (* also matches /): {', '.join(names)}"
+        f"enclave {path} is granted by wildcard (* also matches /): {some_of(names, 8)}"
         for path, names in wildcards.items()
     )
     common.warn(granted, arguments)
