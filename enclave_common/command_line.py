@@ -61,7 +61,7 @@ PATHS: Kind = {**TEXTS, **PATH}
 
 @dataclass(frozen=True)
 class FromProject:
-    """What gives the value of an option that was not written (``enclave_common/project.py``).
+    """The source of the value of an option that was not given (``enclave_common/project.py``).
 
     Attributes:
         key: A key of ``enclaves.yaml``.
@@ -96,7 +96,7 @@ class OptionGroup(Protocol):
 
 
 _NOTES = ("completer", "configured")
-"""What a kind holds beside argparse's words: argcomplete's attribute, and ``FromProject``."""
+"""Keys of a kind beside argparse's own: argcomplete's attribute, and ``FromProject``."""
 
 
 def add_options(group: OptionGroup, options: Iterable[Option]) -> list[argparse.Action]:
@@ -357,7 +357,7 @@ def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -
     """Return the exit status of ``work``, or of the error that ended it: one line on stderr, no traceback.
 
     An error of ``mistakes`` may have its own ``exit_status``, else 1. 130: interrupted (Ctrl-C). 0: who read our output
-    has enough. What is nobody's mistake but ours is raised.
+    has enough. An error of this program is raised.
     """
     try:
         status = work()

@@ -142,7 +142,7 @@ def _written(place: Place) -> str:
 
 
 def _fields(model: type[Strict]) -> dict[str, str]:
-    """Map the keys of a document to the names of the fields, which differ where a key is no name in Python."""
+    """Map the keys of a document to the names of the fields, which differ where a key is not a valid name in Python."""
     fields = getattr(model, "model_fields", None) or getattr(model, "__fields__", {})
     return {getattr(field, "alias", None) or name: name for name, field in fields.items()}
 

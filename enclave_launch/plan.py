@@ -226,7 +226,7 @@ class LaunchSource(NamedTuple):
 
 
 class PlanInputs(NamedTuple):
-    """What a launch is planned from, beside its evaluation; enough to plan it again with a further process."""
+    """The inputs of a plan beside its evaluation. They suffice to plan again with a further process."""
 
     source: LaunchSource
     lookup: InterfaceLookup

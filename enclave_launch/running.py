@@ -28,7 +28,7 @@ from enclave_launch.runtime.warden_process import WardenProcess
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
 UnsecuredLaunch = LaunchSource | EvaluatedLaunch | LaunchPlan
-"""What can be started without enclaves."""
+"""Launches that can start without enclaves."""
 _Launch = UnsecuredLaunch | ProvisionedLaunch
 
 

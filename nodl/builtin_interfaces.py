@@ -4,7 +4,7 @@ A missing permission for one of these is fatal inside the node's constructor, a 
 each row says for which client library and since which distribution it holds, under which condition, and
 where that is known from. A node of unknown library gets the rows of both. What is off unless a program
 asks for it (topic statistics, service introspection) is not here: a manifest has to name it; logger services are
-a row with a condition. A name with ``*`` is of a helper node whose name nobody can foresee.
+a row with a condition. A name with ``*`` belongs to a helper node with an unpredictable name.
 ``ros_discovery_info`` is a matter of DDS permissions, not of ROS names, and has its place there.
 Read by policy derivation and by the reports of inference.
 """

@@ -19,7 +19,8 @@ from pydantic import Field, StrictBool, StrictStr
 from enclave_common.strict_yaml import Strict, StrictDocument
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.bundle import refuse_host_name as refuse_host_name
-from keystore.formats.given_file import parse_given, read_given
+from keystore.formats.given_file import read_given
+from keystore.formats.given_yaml import parse_given
 
 _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
 _DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")

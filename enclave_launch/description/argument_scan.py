@@ -16,7 +16,7 @@ from enclave_launch.host.current import current_host
 
 MISSING_ARGUMENT = "Included launch description missing required argument"
 REQUIRED_ARGUMENT = "Required launch argument"
-"""How upstream's two texts about an argument that nobody gave begin."""
+"""Beginnings of upstream's two texts about an argument without a value."""
 
 
 class Declared(NamedTuple):

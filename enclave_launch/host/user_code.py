@@ -114,7 +114,7 @@ _CHANGES = frozenset(
         *("execute", "visit", "extend_globals", "extend_locals", "launch_configurations"),
     )
 )
-"""What a function uses of launch to change what follows."""
+"""Methods and attributes by which a function changes the rest of the launch."""
 
 
 def starts_nothing(function: object) -> bool:

@@ -62,7 +62,7 @@ ALSO: dict[str, frozenset[BuiltinCondition]] = {
     "service-events": frozenset(),
     UNSEEN: frozenset(),
 }
-"""What ``--also`` grants every node beyond what it has by itself: ``/clock``, which a node needs once a launch sets
+"""Grants of ``--also`` to every node beyond its own: ``/clock``, which a node needs once a launch sets
 ``use_sim_time`` while it runs; the logger services; ``<service>/_service_event`` of service introspection; of a
 recorded node the names that only its other descriptions have (``interfaces.descriptions``)."""
 

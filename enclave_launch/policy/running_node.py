@@ -30,7 +30,7 @@ Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
 
 
 class UnknownNodeName(LaunchFileError):
-    """A program that names its node at random, or as nobody knows: what it serves below its name cannot be signed."""
+    """A program with a random or unknown node name. The services below that name cannot be signed."""
 
 
 class RunningNode(NamedTuple):

@@ -1,4 +1,4 @@
-"""``--explain SUBJECT``: all that a plan can say of an enclave, node, process, component, topic or service."""
+"""``--explain SUBJECT``: everything a plan knows about an enclave, node, process, component, topic or service."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Provider(Protocol):
 
 
 class LateProcess(RuntimeFailure):
-    """A process about to start is not what was planned: it needs permissions that nobody signed."""
+    """A process about to start differs from the plan: it needs permissions that were not signed."""
 
 
 def permission_facts(item: ResolvedProcess | ResolvedComponent) -> Mapping[str, object]:

@@ -82,7 +82,7 @@ def run_launch(launch: LiveLaunch) -> int:
 class LiveLaunch:
     """One run of a launch file. ``shut_down`` may be called from the loop at any time.
 
-    ``needs_ros_services``: ``None`` where nobody knows before the file is visited. ``warden``: one that is starting up
+    ``needs_ros_services``: ``None`` if it is unknown until the file is visited. ``warden``: one that is starting up
     already; it ends with the launch.
     """
 

@@ -83,7 +83,7 @@ _wardens: set[int] = set()  # of every launch that runs in this program
 
 @contextlib.contextmanager
 def _subreaper() -> Iterator[None]:
-    """Become the parent of processes below us that lose theirs; says nothing if there is no prctl."""
+    """Become the parent of processes below us that lose theirs. Does nothing without prctl."""
     libc = load_libc()
     if libc is None:
         yield

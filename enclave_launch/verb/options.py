@@ -125,7 +125,9 @@ def distribution(text: str) -> str:
     name = text.partition("@")[0]
     if name not in known:
         question = did_you_mean(name, known)
-        raise argparse.ArgumentTypeError(f"'{name}' is no known distribution ({', '.join(known)}){question}")
+        raise argparse.ArgumentTypeError(
+            f"'{name}' is not a known distribution ({', '.join(known)}){question}"
+        )
     try:
         choose_release(text, None)
     except ValueError as error:

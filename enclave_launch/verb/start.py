@@ -56,7 +56,7 @@ def _nothing_to_watch(launch: ProvisionedLaunch) -> Watch | None:
 
 @dataclass(frozen=True)
 class Company:
-    """What accompanies a launch in a mode.
+    """The companions of a launch in a mode.
 
     Attributes:
         check: Called with the plan before keys are made. It raises an ``EnclaveLaunchError``.
@@ -96,7 +96,7 @@ def start(
 def _launch_plainly(
     target: LaunchTarget, options: argparse.Namespace, companion: LaunchCompanion | None
 ) -> int:
-    """Launch without enclaves: nobody has to know what the nodes say to each other."""
+    """Launch without enclaves. The interfaces of the nodes need not be known."""
     launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
     return run_unsecured(launch, options=replace(run_settings(options), companion=companion))

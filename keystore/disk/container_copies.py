@@ -58,7 +58,7 @@ def differing_copies(root: Path) -> Iterator[tuple[str, str]]:
         enclave, info = from_flat_name(path.parent.name), os.lstat(path)
         content = safe_files.read_if_there(root, layout.source_of(enclave, path.name)) if enclave else None
         if content is None or not path.is_file() or path.is_symlink():
-            yield relative, "is no copy of a file of an enclave"
+            yield relative, "is not a copy of a file of an enclave"
         elif not os.access(path, os.R_OK) or path.read_bytes() != content:
             yield relative, "is not the enclave's file"
         elif path.name == layout.KEY and (

@@ -30,7 +30,7 @@ def deployed_manifest(view: KeystoreView) -> Manifest | None:
         return None
     if signed is None:
         raise DamagedKeystoreError(
-            f"{printable(view.root / layout.BUNDLE)} is missing: nobody can tell what was imported"
+            f"{printable(view.root / layout.BUNDLE)} is missing, so it is unknown what was imported"
         )
     return read_manifest(signed, printable(view.root / layout.BUNDLE), view.ca_bundle(Role.PERMISSIONS))
 

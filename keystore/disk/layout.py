@@ -67,7 +67,7 @@ ENCLAVE_FILES = frozenset({
 RUNTIME_FILES = (
     "identity_ca.cert.pem", CERT, KEY, "permissions_ca.cert.pem", ENCLAVE_GOVERNANCE, PERMISSIONS,
 )  # fmt: skip
-"""What a process needs to start (rmw_dds_common security.cpp): all six, or none."""
+"""The files that a process needs to start (rmw_dds_common security.cpp): all six, or none."""
 
 
 def read_by_processes(enclaves: Iterable[str]) -> Iterator[str]:

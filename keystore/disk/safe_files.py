@@ -56,7 +56,7 @@ def read(root: Path, relative: str) -> bytes:
 
 
 def read_if_there(root: Path, relative: str) -> bytes | None:
-    """Read as ``read``; None if there is no such file (a dangling link counts as none)."""
+    """Read as ``read``. Return None for a missing file or a dangling link."""
     try:
         return _read(root, relative)
     except (FileNotFoundError, NotADirectoryError):

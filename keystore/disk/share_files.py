@@ -73,7 +73,7 @@ class LaunchHold:
                 fcntl.flock(self._descriptor, fcntl.LOCK_SH)
 
     def is_alone(self) -> bool:
-        """Return whether nobody else holds the same launch."""
+        """Return True if no other process holds the same launch."""
         if self._descriptor is None:
             return not is_running(self.root, self.owner)
         try:

@@ -37,7 +37,7 @@ def governance_in_force(view: KeystoreView) -> Governance:
 def governance_domains(view: KeystoreView) -> Domains:
     """Return the domains of the governance signed last, in a keystore of another tool too.
 
-    Raises DamagedKeystoreError if nobody can tell.
+    Raises DamagedKeystoreError if that cannot be decided.
     """
     place = printable(view.root / layout.GOVERNANCE)
     register = read_register(view.root)

@@ -45,7 +45,7 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A relative link, or a copy of ``source`` (relative to the keystore) where there are no links."""
+    """A relative link, or a copy of ``source`` (relative to the keystore) on a file system without links."""
 
     target: str
     source: str
@@ -68,12 +68,12 @@ class Store:
         self.has_register = present is not None
         """False on a host that issues nothing, and before the first thing is issued."""
         self.register = present or Register()
-        """What was issued so far; each ``Batch.record`` replaces it."""
+        """The certificates and documents issued so far; each ``Batch.record`` replaces it."""
         self._adopted = False
         self.clock: datetime | None = None
-        """What the machine's clock said when this was opened; None where the caller gave the time."""
+        """The time of the machine's clock at the opening, or None if the caller gave the time."""
         self.notes: list[str] = []
-        """What was done to the keystore itself while opening it, for the report."""
+        """Changes made to the keystore while opening it, for the report."""
 
     @contextmanager
     def batch(self) -> Iterator[Batch]:
@@ -162,7 +162,7 @@ class Store:
 
 
 class Batch:
-    """What one ``Store.batch`` block adds; targets are paths relative to the keystore."""
+    """The additions of one ``Store.batch`` block. Targets are paths relative to the keystore."""
 
     def __init__(self, store: Store):
         self._store = store

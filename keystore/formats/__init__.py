@@ -1,1 +1,1 @@
-"""What the files of a keystore say: names, policy, permissions, governance, certificates as values. Performs no I/O."""
+"""Content of a keystore's files: names, policy, permissions, governance, certificates as values. Performs no I/O."""

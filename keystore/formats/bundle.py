@@ -1,4 +1,4 @@
-"""What a bundle for one host says about itself: the manifest, signed by the permissions CA.
+"""The manifest of a bundle for one host, signed by the permissions CA.
 
     bundle.p7s      the manifest, as S/MIME like governance and permissions
     public/...      trust anchors and CRL          enclaves/...    governance and each enclave's files

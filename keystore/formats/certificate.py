@@ -1,4 +1,4 @@
-"""What the keystore wants to know of a certificate, and the one form that a certificate file may have.
+"""Facts about a certificate, and the one form that a certificate file may have.
 
 Everything is read by ``cryptography``. A file of a keystore is PEM exactly as ``cryptography`` writes it: whatever else
 stands in such a file, another reader may take for the certificate.
@@ -34,7 +34,7 @@ UNREADABLE = (
     x509.InvalidVersion,
     x509.UnsupportedGeneralNameType,
 )
-"""What ``cryptography`` raises for a certificate, a request or a CRL that it cannot read."""
+"""Exceptions of ``cryptography`` for a certificate, a request or a CRL that it cannot read."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def refuse_clock_before_program(now: datetime, keystore: str) -> None:
 def refuse_clock_before(now: datetime, authorities: Iterable[CertificateFacts]) -> None:
     """Raise WrongClockError if ``now`` is before one of these CAs begins.
 
-    A certificate that has not begun is no expired one: nothing of the keystore has to be replaced.
+    A certificate that is not yet valid has not expired: nothing of the keystore has to be replaced.
     """
     begins = max((facts.validity.not_before for facts in authorities), default=now)
     if now < begins:

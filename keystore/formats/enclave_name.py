@@ -1,4 +1,4 @@
-"""What an enclave name is: rcl's ``rcl_validate_enclave_name``, tightened to what DDS can carry."""
+"""The grammar of enclave names: rcl's ``rcl_validate_enclave_name``, tightened to what DDS can carry."""
 
 from __future__ import annotations
 

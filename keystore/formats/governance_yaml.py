@@ -13,7 +13,8 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from enclave_common.strict_yaml import Strict, StrictDocument
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
-from keystore.formats.given_file import parse_given, read_given
+from keystore.formats.given_file import read_given
+from keystore.formats.given_yaml import parse_given
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, read_foreign_governance
 
 

@@ -1,4 +1,4 @@
-"""What one enclave may do -> its DDS-Security permissions document, ready to be signed. Performs no I/O.
+"""The policy of one enclave -> its DDS-Security permissions document, ready to be signed. Performs no I/O.
 
 Exactly the grants that ``ros2 security create_permission`` would write for the same policy, in the one form that
 Cyclone DDS and Fast DDS read alike, and without what breaks either of them:
@@ -70,7 +70,7 @@ class DdsRules(NamedTuple):
 
 
 class Permissions(NamedTuple):
-    """What a permissions document says. ``name`` is the grant's, ``subject`` that of the certificate it is for
+    """Content of a permissions document. ``name`` is the grant's, ``subject`` that of the certificate it is for
     (``CN=/talker``)."""
 
     name: str

@@ -28,7 +28,7 @@ _NODE_PATTERN = re.compile(rf"(?:[A-Za-z_*?]|{_CLASS})(?:[A-Za-z0-9_*?]|{_CLASS}
 
 Topics = tuple[str, ...]
 Forms = tuple[tuple[str, str], ...]
-"""What stands before and after a name."""
+"""Prefix and suffix of a name."""
 
 _TOPIC: Forms = (("rt", ""),)
 _REQUEST: Forms = (("rq", "Request"),)

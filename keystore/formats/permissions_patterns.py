@@ -157,7 +157,7 @@ def _meet(a: tuple[Element, ...], b: _Positions) -> bool:
 
 
 class _Positions(NamedTuple):
-    """Where in a pattern what may stand, as bits. ``end``: behind its last element."""
+    """Positions in a pattern by the characters that may stand there, as bits. ``end``: behind its last element."""
 
     of_character: dict[str, int]
     stars: int

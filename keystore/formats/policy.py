@@ -15,8 +15,8 @@ class PolicyError(InvalidInputError):
 
 
 class Operation(str, Enum):
-    """What a rule is about; the value is the attribute of the policy XML, where ``call`` is said of actions alone.
-    ``verb`` is the word in messages: the same for topics, services and actions everywhere."""
+    """The operation that a rule is about. The value is the attribute of the policy XML, which has ``call``
+    for actions only. ``verb`` is the word in messages: the same for topics, services and actions everywhere."""
 
     __str__ = str.__str__
 
@@ -42,7 +42,7 @@ _VERBS = {
 
 
 class Qualifier(str, Enum):
-    """Whether a rule of an SROS2 policy grants or refuses."""
+    """Effect of a rule of an SROS2 policy: grant or refuse."""
 
     __str__ = str.__str__
 

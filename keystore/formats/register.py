@@ -185,7 +185,7 @@ class Register:
         return replace(self, crl_number=number, crl_published=True)
 
     def without_ended(self, now: datetime) -> Register:
-        """Forget what nobody can use any more; what is in force stays, so that an enclave is still known.
+        """Remove entries that have expired. The entries in force stay, so that each enclave remains known.
 
         What was revoked stays while its CA is trusted: neither a wrong clock nor a host may miss it on the CRL.
         """

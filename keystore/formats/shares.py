@@ -21,7 +21,7 @@ _VERSION = 1
 
 
 class Share(NamedTuple):
-    """What ``owner`` requests for one enclave, and in which domains. ``types``: as ``zenoh.types`` keeps them; only of
+    """The request of ``owner`` for one enclave, with its domains. ``types``: as ``zenoh.types`` keeps them; only of
     enclaves that are on Zenoh."""
 
     owner: str

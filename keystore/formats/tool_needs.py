@@ -1,4 +1,4 @@
-"""What each ROS tool needs to work on a secured robot: the one table of it. Pure; docs/running-systems.md shows it.
+"""The permissions that each ROS tool needs on a secured robot, as a table that docs/running-systems.md shows.
 
 Recorded and tried on real ROS 2 jazzy: a ``ros2`` command is a node ``/_ros2cli_<pid>`` that publishes ``/rosout`` and
 ``/parameter_events`` and serves ``get_type_description`` below its own name (the pid is in it, so a wildcard stands
@@ -24,7 +24,7 @@ Need = tuple[Operation, str]
 
 
 class ToolTarget(Enum):
-    """What a tool works on; the value is the word for a person."""
+    """Kind of subject of a tool. The value is the word in messages."""
 
     NOTHING = ""
     TOPIC = "TOPIC"

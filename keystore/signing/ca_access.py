@@ -67,7 +67,7 @@ class Secret:
 
 
 def keep_memory_private() -> None:
-    """Leave no core dump of this process, and let nobody of the same user read its memory (prctl(2), Linux alone)."""
+    """Disable core dumps of this process and reading of its memory by the same user (prctl(2), Linux only)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
 

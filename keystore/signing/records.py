@@ -1,4 +1,4 @@
-"""What the register keeps of a certificate and of a signed document."""
+"""Entries of the register for a certificate and for a signed document."""
 
 from __future__ import annotations
 

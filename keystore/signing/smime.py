@@ -52,7 +52,7 @@ _OPTIONS = (
 _ASN1_ERRORS = (
     ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, RecursionError,
 )  # fmt: skip
-"""What ``asn1crypto`` raises for damaged messages."""
+"""Exceptions of ``asn1crypto`` for damaged messages."""
 _ATTRIBUTES = frozenset({"content_type", "message_digest", "signing_time"})
 _SIGNATURES = frozenset({"sha256_ecdsa", "sha256_rsa", "rsassa_pkcs1v15"})
 

@@ -1,1 +1,1 @@
-"""What is done with a keystore, a module each: create, provision, renew, roll over, remove, export."""
+"""The operations on a keystore, a module each: create, provision, renew, roll over, remove, export."""

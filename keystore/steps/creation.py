@@ -172,7 +172,7 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
         with opened.batch() as batch:
             batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
             batch.file(layout.ca_cert(role), facts.pem)
-        return "of somebody else imported; it signs what hosts request", [*_key_warnings(role, facts)]
+        return "of another owner imported; it signs what hosts request", [*_key_warnings(role, facts)]
     if given is not None and given.key is not None:
         made, key = _import_ca(role, options, given.key)
         verb, warnings = "imported", _shared_ca_warnings(role, options)
@@ -299,7 +299,7 @@ def _complete_governance(opened: Store, options: CreateOptions) -> bool:
 def _unsigned_default(root: Path) -> bytes | None:
     """Return what an interrupted run left beside a missing ``governance.p7s``, unless it is weaker than the default.
 
-    Raises DamagedKeystoreError for any other document: nobody signed it, so a person must review it first.
+    Raises DamagedKeystoreError for any other document: it is not signed, so a person must review it first.
     """
     present = safe_files.read_if_there(root, layout.GOVERNANCE_XML)
     if present is None:

@@ -252,7 +252,7 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
 def _key_is_ours(enclave: _Enclave, register: Register, key_pem: bytes) -> bool:
     """Return whether the key is that of the certificate in force, or of one by the present CA that is not revoked.
 
-    Only such a key is certified again. What an old CA issued says nothing: nobody revokes it.
+    Only such a key is certified again. A certificate of an earlier CA proves nothing, since nothing revokes it.
     """
     try:
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))

@@ -1,4 +1,4 @@
-"""What a keystore holds, as plain values for reports. Reads no private key, proves no signature (see ``verify``)."""
+"""Contents of a keystore as plain values for reports. Reads no private key, proves no signature (see ``verify``)."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
 
 def _adopt_crls(opened: Store) -> None:
     """Take over what any CRL in the tree lists and the register does not, as after ``private/`` was restored from a
-    backup, or where somebody revoked with openssl. Nobody who was revoked comes back.
+    backup, or after a revocation with openssl. A revoked certificate stays revoked.
     """
     view = KeystoreView(opened.root)
     # The register's CAs count: a trust file that is damaged is repaired only later.
@@ -98,7 +98,7 @@ def _adopt_crls(opened: Store) -> None:
 
 
 def with_crls(opened: Store, found: Iterable[ListedCrl]) -> Register:
-    """Return the register with all that these CRLs list; what was new of it is told."""
+    """Return the register with all that these CRLs list, and report additions."""
     register = opened.register
     for crl in found:
         issuer, end = fingerprint(crl.issuer.der), crl.issuer.validity.not_after
@@ -137,7 +137,7 @@ def take_over(opened: Store) -> None:
     """Record what can be known of a keystore that SROS2 made, or whose register was lost: all that its CAs really
     signed.
 
-    Raises DamagedKeystoreError for a CRL that cannot be trusted: nobody knows then who was revoked.
+    Raises DamagedKeystoreError for a CRL that cannot be trusted: the revoked certificates are then unknown.
     """
     view = KeystoreView(opened.root)
     settings = safe_files.read_if_there(opened.root, layout.SETTINGS) or b""

@@ -62,9 +62,9 @@ class ProvisionOptions(NamedTuple):
     """By enclave, of those on Zenoh: the types of what the launch requests (``zenoh.types.types_text``)."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
     signing: Signing | None = None
-    """Where signing is done by a process of its own; it has the ``access``, and everything that was requested."""
+    """The process that signs. It has the ``access`` and everything that was requested."""
     guid_halves: Mapping[str, Half] = MappingProxyType({})
-    """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""
+    """The half of GUIDs for participants of enclaves without a certificate. Their subjects are chosen for it."""
 
     def domains_of(self, enclave: str) -> Domains:
         """Return the domains that the permissions of one enclave are for."""
@@ -88,11 +88,11 @@ class EnclaveReport(NamedTuple):
 
 
 class ProvisionReport(NamedTuple):
-    """What one provisioning did, enclave by enclave."""
+    """Result of one provisioning, enclave by enclave."""
 
     keystore: Path
     created: tuple[str, ...]
-    """What was done to the keystore itself, in words."""
+    """Changes to the keystore itself, in words."""
     enclaves: tuple[EnclaveReport, ...]
     warnings: tuple[str, ...] = ()
     ends: datetime | None = None

@@ -1,4 +1,4 @@
-"""What an enclave was granted before: to grant it again, or to see what it loses.
+"""Earlier permissions of an enclave: to grant them again, or to show what it loses.
 
 Only the document signed last counts, as the register has it. An older one that was put back was signed by us
 too; to sign it again, or to compare with it, would give back what was taken away.

@@ -47,7 +47,7 @@ class RemoveOptions(ChangeOptions):
 
 @dataclass(frozen=True, slots=True)
 class RemoveReport:
-    """What a removal did."""
+    """Result of a removal."""
 
     removed: tuple[str, ...]
     revoked: int

@@ -68,7 +68,7 @@ def roll_over(
 ) -> ProvisionReport:
     """Do one step of replacing CAs; repeating an interrupted step completes it.
 
-    ``lost_key``: the key of the permissions CA is gone, so nobody can tell hosts who follows.
+    ``lost_key``: the key of the permissions CA is gone, so no handover to the next CA can be signed.
 
     Raises InvalidInputError for a step out of order. What would stop ``start`` or ``switch`` half-way raises before
     anything is written: SigningUnavailableError for a key that does not open, DamagedKeystoreError for a document.

@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 
 
 class SecretOptions(NamedTuple):
-    """What opens CA keys, by file, descriptor or environment variable: arguments can be read by others. Only one of
-    its options may be given."""
+    """Secrets that open CA keys, by file, descriptor or environment variable: arguments can be read by others.
+
+    Only one of its options may be given."""
 
     title: str
     options: tuple[Option, ...]

@@ -34,7 +34,7 @@ OPTIONS: common.Table = (
     ("--ca", {"choices": ("start", "switch", "finish")}, "a step of replacing CAs"),
     ("--ca-role", {"choices": ("identity", "permissions", "both"), "default": "both"},
      "which CA to replace (both)"),
-    ("--lost-key", FLAG, "with --ca start: the permissions CA's key is gone, and hosts are pinned anew"),
+    ("--lost-key", FLAG, "with --ca start: the permissions CA's key is lost: hosts must pin the new CAs"),
     ("--ca-valid-for TIME", {"default": "10y"}, "validity of new CAs (10y)"),
     common.ENCRYPTION,
     *common.PROVISIONING,

@@ -160,7 +160,7 @@ def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
         load_crl(view)
         validity = crl_validity(view)
     except KeystoreError as error:
-        fix = f"{repair.BACKUP}: without it nobody knows who was revoked"
+        fix = f"{repair.BACKUP}: without it the revoked certificates are unknown"
         yield Finding(Severity.ERROR, "crl", layout.CRL, str(error), fix)
         return
     if not validity.covers(now):

@@ -163,7 +163,7 @@ class _EnclaveCheck:
         uri = self._read(layout.KEY_URI)
         if uri is not None and not _TOKEN_URI.match(uri):
             fix = repair.run_on(self._view.root, "rm", f"{self._directory}/{layout.KEY_URI}", "then renew it")
-            text = "is no pkcs11: URI that names a key (object= or id=)"
+            text = "is not a pkcs11: URI that names a key (object= or id=)"
             yield self._finding(Severity.ERROR, "key", layout.KEY_URI, text, fix)
 
     def _certificate(self) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""What ``verify`` found: plain values, worded once, rendered elsewhere."""
+"""Findings of ``verify`` as plain values. They are worded here and rendered elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in the keystore held against what the register says was issued last.
+"""Comparison of the keystore with what the register lists as issued last.
 
 What was put back was signed here once, and proves nothing about today. Without a register fingerprints can be shown."""
 
@@ -64,7 +64,7 @@ def check_anchors(
         if register is None and len(bundle) > 1 and not wanted and not _is_imported(view):
             yield Finding(
                 Severity.EXPOSURE, "several-cas", layout.ca_cert(role),
-                f"trusts {len(bundle)} CAs: {'; '.join(map(describe, bundle))}; without a register nobody can say "
+                f"trusts {len(bundle)} CAs: {'; '.join(map(describe, bundle))}; without a register it is unknown "
                 "whether a roll-over is under way", "verify --require-ca SHA256 for each CA that is meant",
             )  # fmt: skip
 

@@ -162,7 +162,7 @@ class Spawned(NamedTuple):
 
 
 class Launched(NamedTuple):
-    """What else the launch starts, as far as this node depends on it.
+    """Other parts of the launch on which this node depends.
 
     ``robot_description``: the URDF that a node has as its parameter. ``masks``: of costmap filters, the final topic of
     the filter info and the mask's topic in that message.

@@ -1,4 +1,4 @@
-"""What our section of a NoDL v2 document says of names that were learnt from runs (written by recording).
+"""The part of our section in a NoDL v2 document about names learnt from runs (written by recording).
 
     codegen:
       enclave_launch:

@@ -1,4 +1,4 @@
-"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, and notes of what it cannot say. Performs no I/O."""
+"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, with notes of what it cannot express. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ def test_no_keystore_named_anywhere_is_wrong_usage(here: Path) -> None:
         ("\nkeystore: 3\n", ":2: keystore: a text is expected"),
         ("accept:\n- {cod: no-server, why: x}\n", ":2: accept[0]: unknown key 'cod'; did you mean 'code'?"),
         ("enclave-scope: nod\n", "enclave-scope: 'nod' is not one of namespace, node, process, launch"),
-        ("distro: jazy\n", "distro: 'jazy' is no known distribution"),
+        ("distro: jazy\n", "distro: 'jazy' is not a known distribution"),
         ("- keystore\n", ": not a mapping with the keys never, accept, keystore"),
         ("keystore: a\nkeystore: b\n", ":2: 'keystore' is written twice"),
     ],

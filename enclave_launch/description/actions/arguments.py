@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @expose_action("arg")
 @read_only("name", "default_value", "description", "choices")
 class DeclareLaunchArgument(Action):
-    """Declares an argument: if nobody has set that launch configuration, the default does.
+    """Declare an argument: its default applies if the launch configuration is not set.
 
     Raises ``RuntimeError`` for empty choices, and for a default of plain text that is not among them.
     """

@@ -26,7 +26,7 @@ class Event:
     name = "launch.Event"
 
     def subject(self) -> str:
-        """Return whom it is about, for the marks of a dry run (``OnProcessExit talker-1``); empty if nobody."""
+        """Return the subject of the event for the marks of a dry run (``OnProcessExit talker-1``), or an empty text."""
         return ""
 
 

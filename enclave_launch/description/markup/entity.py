@@ -85,7 +85,7 @@ class Entity:
         raise NotImplementedError()
 
     def assert_entity_completely_parsed(self) -> None:
-        """Raise ``ValueError`` naming the attributes and children that nobody has read."""
+        """Raise ``ValueError`` with the names of attributes and children that were not read."""
         raise NotImplementedError()
 
 

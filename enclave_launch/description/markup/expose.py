@@ -39,7 +39,7 @@ _GATES: dict[str, dict[str, Since]] = {"action": {}, "substitution": {}}
 def instantiate_action(entity: Entity, parser: Parser) -> Action:
     """Build the action that ``entity`` names.
 
-    Raises ``RuntimeError`` for an unknown tag, ``ValueError`` for an attribute or child nobody read, and
+    Raises ``RuntimeError`` for an unknown tag, ``ValueError`` for an attribute or child that was not read, and
     whatever the action's ``parse`` or constructor raises; each carries the place (``error_location``).
     """
     try:

@@ -34,7 +34,7 @@ _MODES = ("fail", "ignore", "warn", "capture")
 
 @expose_substitution("command")
 class Command(TemplateSubstitution):
-    """What a command writes to stdout, unstripped. Run without a shell, each time it is performed.
+    """The output of a command on stdout, unstripped. Run without a shell, each time it is performed.
 
     ``on_stderr``: ``fail`` when it writes there, ``warn``, ``ignore``, or ``capture`` it with stdout.
     """

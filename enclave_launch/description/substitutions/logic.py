@@ -29,7 +29,7 @@ Parsed = tuple[type[Substitution], dict[str, Any]]
 
 
 def perform_boolean(context: LaunchContext, value: list[Substitution]) -> bool:
-    """Evaluate to a boolean; raises ``SubstitutionFailure`` for what is no YAML boolean."""
+    """Evaluate to a boolean; raises ``SubstitutionFailure`` for other values than YAML booleans."""
     try:
         return bool(perform_typed_substitution(context, value, bool))
     except (TypeError, ValueError) as error:

@@ -97,7 +97,7 @@ class Parameter(TemplateSubstitution):
         return f"{type(self).__name__}(name={described(self.name)})"
 
     def perform(self, context: LaunchContext) -> str:
-        """Return the value; raises ``SubstitutionFailure`` if there is no such parameter and no default."""
+        """Return the value; raises ``SubstitutionFailure`` without the parameter and without a default."""
         name = perform_substitutions(context, self.name)
         no_parameters: Any = [] if _takes_default() else None  # without defaults, iterating None fails
         for item in context.launch_configurations.get("global_params", no_parameters):
