@@ -119,7 +119,7 @@ class Library:
 
 
 class LibraryDocuments(NamedTuple):
-    """What documents refer to in a library, as ``enclave_addons.library.apply`` requests it. ``of_source``: what
+    """References of documents in a library, as ``enclave_addons.library.apply`` requests them. ``of_source``: what
     sources say of a plugin, by its class and instance, that no document describes."""
 
     library: Library

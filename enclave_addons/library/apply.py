@@ -37,7 +37,7 @@ _DEPTH = 8
 
 
 class Documents(Protocol):
-    """Where the descriptions of plugins and further nodes are found; ``None``: nobody describes it."""
+    """Source of the descriptions of plugins and further nodes. ``None`` means that there is no description."""
 
     def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None: ...
 
@@ -298,7 +298,7 @@ def _varied(
 
 
 def _default(endpoint: Endpoint, template: str, notes: tuple[str, ...]) -> Endpoint:
-    """Return the listed name: what it has while nobody sets the parameter."""
+    """Return the listed name, which holds unless the parameter is set."""
     parameter = template.removeprefix("$(param ").removesuffix(")")
     note = "; ".join((f"parameter {parameter}, its default", *notes))
     return endpoint._replace(note=note, certainty=Certainty.FROM_DEFAULT)

@@ -21,7 +21,7 @@ def stem_of(file: str) -> str:
 
 
 class Evidence(NamedTuple):
-    """Where the description comes from. ``missing``: what is known to be left out; ``differs``: why an analysis of
+    """Source of the description. ``missing``: parts that are known to be left out; ``differs``: why an analysis of
     the same sources says something else."""
 
     repository: str = ""

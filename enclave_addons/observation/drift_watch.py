@@ -271,8 +271,8 @@ def _strangers(graph: Graph, started: set[int]) -> frozenset[int]:
         for each in graph.processes
         if each.participant.pid is not None and each.participant.host == host
     }
-    # One that has ended has no lineage and is nobody's; one of the launch has one of its processes as parent, or is in
-    # its session.
+    # A process that has ended has no lineage and belongs to no launch. A process of the launch has one of the launch's
+    # processes as parent, or is in its session.
     lineages = {pid: set(_lineage(pid)) for pid in seen}
     ours = started | {os.getpid()}
     return frozenset(pid for pid, lineage in lineages.items() if lineage and not lineage & ours)

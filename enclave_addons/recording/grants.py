@@ -34,7 +34,7 @@ WORDS = {
 }
 
 
-NO_ENCLAVE_YET = "(unknown: there is no description of the node)"
+NO_ENCLAVE_YET = "(unknown: the node has no description)"
 
 
 class Need(NamedTuple):
@@ -47,7 +47,7 @@ class Need(NamedTuple):
 
 
 class Description(NamedTuple):
-    """What the plan has of a recorded node. ``node`` ``None``: no such node was planned."""
+    """The planned counterpart of a recorded node. ``node`` is ``None`` if the plan lacks it."""
 
     node: RunningNode | None
     origin: InterfaceOrigin | None = None

@@ -28,7 +28,7 @@ from enclave_launch.runtime.companion import LaunchControl
 
 RECORDS = "records"
 _LONGEST_START = 60.0
-"""Seconds that a process may take from its start to its first word to rcl before nobody waits for it any more."""
+"""Seconds that a process may take from its start to its first message from rcl before learning stops waiting for it."""
 
 
 class QuietWatch(Listener):

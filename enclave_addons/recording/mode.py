@@ -19,7 +19,7 @@ OPTIONS: tuple[Option, ...] = (
     ("--learn-isolation", one_of("auto", "local", "none"),
      "isolate the learning run in a network namespace, else on this machine (auto), only the latter, or not"),
     ("--audit", FLAG,
-     "run unsecured, and report what the plan would refuse and what it grants that nobody requests"),
+     "run unsecured, and report what the plan would refuse and what it grants without a request"),
     ("--audit-report FILE", PATH, "write the audit as JSON, too"),
 )  # fmt: skip
 

@@ -56,7 +56,7 @@ from nodl.ros_arguments import parse_ros_arguments
 INTERVAL = 0.1
 """Seconds between two reads of the record."""
 _LONGEST_WAIT = 2.0
-"""Seconds after which nobody waits any more to hear who started a process."""
+"""Seconds to wait for the report about the parent of a process."""
 
 
 class Unrecorded(NamedTuple):
@@ -296,7 +296,7 @@ class Recording:
 
     def _name_the_silent(self) -> None:
         if self._optional:
-            return  # nobody counts on the record being complete
+            return  # no caller relies on a complete record
         known = {item.process for item in self.unrecorded}
         for started in self.record.silent():
             if started.process not in known:

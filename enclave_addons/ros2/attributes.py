@@ -105,7 +105,7 @@ Parse = Callable[..., tuple[type, dict[str, Any]]]
 
 
 def _reading_enclave(parse: Parse) -> Parse:
-    """Read before upstream's parser, which refuses attributes that nobody has read."""
+    """Read before upstream's parser, which refuses unread attributes."""
 
     @functools.wraps(parse)
     def wrapped(entity: Any, parser: Any, *args: Any, **kwargs: Any) -> tuple[type, dict[str, Any]]:
@@ -130,7 +130,7 @@ def _reading_enclave_class(parse: Parse) -> Parse:
 def _pushing_enclave_scope(execute: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(execute)
     def wrapped(self: Any, context: Any) -> Any:
-        if session_of(context) is not None:  # else nobody asks for the scope
+        if session_of(context) is not None:  # otherwise the scope is not used
             enclave = enclave_attribute(self, context)
             namespace = perform_substitutions(context, self.namespace)
             push_enclave_scope(context.launch_configurations, enclave, namespace)

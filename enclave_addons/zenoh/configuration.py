@@ -5,8 +5,8 @@ enclave's own certificate; the router must be who it says it is. A custom file r
 what ROS needs otherwise than Zenoh's defaults stands here too (DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5).
 
 Router (``ZENOH_ROUTER_CONFIG_URI``): what enforces. Mutual TLS only, everything denied that no rule allows, each rule
-bound to the common name of an enclave's certificate. No gossip and no multicast, so that nobody learns of ways around;
-links end with the certificate they were opened with.
+bound to the common name of an enclave's certificate. No gossip and no multicast, so that no peer learns of other
+routes; links end with the certificate they were opened with.
 """
 
 from __future__ import annotations

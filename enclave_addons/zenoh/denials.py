@@ -1,4 +1,4 @@
-"""What a Zenoh router refused, explained from its log and the keystore: who, what, why, and what allows it.
+"""Denials of a Zenoh router, explained from its log and the keystore: who, what, why, and what allows it.
 
 Reads only. The log is untrusted text, and keeps what clients sent: everything of it is printed as text.
 
@@ -27,7 +27,7 @@ from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyErro
 from keystore.formats.policy_xml import policy_xml
 
 RUST_LOG = "zenoh=info,zenoh::net::routing::interceptor=trace"
-"""What a router has to be started with."""
+"""Environment with which a router must be started."""
 
 _COLOUR = re.compile(r"(?:\x1b|\\x1b)\[[0-9;]*m")
 _DENIED = re.compile(
@@ -121,7 +121,7 @@ def _turned_away(text: str) -> TurnedAway | None:
 
 
 _WITHOUT_EFFECT = "/@adv/sub/"
-"""A subscription of rmw_zenoh says there that it is one; nobody asks for that, so it is not granted."""
+"""A subscription of rmw_zenoh announces itself there. No node requests that, so it is not granted."""
 
 
 _APPLY = (

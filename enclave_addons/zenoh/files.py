@@ -1,4 +1,4 @@
-"""What the files for Zenoh should be, from what else stands in the keystore. Reads only; ``steps`` writes.
+"""Expected files for Zenoh, derived from the rest of the keystore. Reads only.
 
 Everything follows from certificates in force and permissions as signed, so that whatever changes these (a launch, a
 renewal, a revocation, another CA) changes the router's rules too. An enclave is on Zenoh where it has ``zenoh.json5``.

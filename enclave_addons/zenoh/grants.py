@@ -1,4 +1,4 @@
-"""What one enclave may do, in the four ways that a Zenoh router can distinguish. Performs no I/O.
+"""Permissions of one enclave in the four ways that a Zenoh router can distinguish. Performs no I/O.
 
 Made from the DDS topics that its permissions grant, so that both middlewares enforce the same and never anything else:
 what ``permissions`` decided about denials holds here too.
@@ -19,7 +19,7 @@ from keystore.formats.policy import EnclavePolicy, Operation
 
 
 class Use(str, Enum):
-    """What is done with a key: an action is three services and two topics."""
+    """Use of a key: an action is three services and two topics."""
 
     __hash__ = str.__hash__
 

@@ -16,7 +16,7 @@ from enclave_addons.zenoh.key_expressions import cache, data_keys, domain_chunks
 from keystore.formats.domains import Domains
 
 GRAPH_KINDS = {"MP": Use.PUBLISH, "MS": Use.SUBSCRIBE, "SC": Use.CALL, "SS": Use.SERVE}
-"""What a token of an endpoint says of it (liveliness_utils.cpp)."""
+"""Content of an endpoint's token (liveliness_utils.cpp)."""
 
 
 class AccessRule(NamedTuple):

@@ -1,6 +1,6 @@
 """The files for Zenoh: whether the router enforces what is signed, and whether it is who it says it is.
 
-A file that is not what follows from the keystore is an error, whatever differs: nobody needs to edit one.
+A file that is not what follows from the keystore is an error, whatever differs. Such files need no editing.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return of_configuration(root)
     if kind == "rslidar":
         return of_sensors(root)
-    return Configured(gaps=(Gap(place, f"there is no reader for files of kind {kind!r}"),))
+    return Configured(gaps=(Gap(place, f"files of kind {kind!r} have no reader"),))
 
 
 def _read(file: str, text: str | None, *, last_counts: bool) -> YamlValue:

@@ -19,7 +19,7 @@ _ONLINE, _OF_ROS, _OF_FILE = "1", "2", "3"
 
 
 class _Made(NamedTuple):
-    """What the program makes for each lidar under a switch of ``common``: an endpoint on a node of its own."""
+    """An endpoint that the program makes for each lidar, on a node of its own, under a switch of ``common``."""
 
     kind: EndpointKind
     key: str

@@ -41,7 +41,7 @@ _OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"
 
 
 class Security(NamedTuple):
-    """What is known of a secured system.
+    """Facts about a secured system.
 
     Attributes:
         enclaves: First bytes of GUIDs → enclave of this keystore.
@@ -53,7 +53,7 @@ class Security(NamedTuple):
 
 
 class Circumstances(NamedTuple):
-    """What a comparison uses beside plan and graph.
+    """Inputs of a comparison beside plan and graph.
 
     Attributes:
         security: ``None`` if the system runs unsecured.

@@ -1,4 +1,4 @@
-"""What DDS discovery announced (claims of whoever sent them) → processes, nodes and their interfaces. Performs no I/O.
+"""Announcements of DDS discovery (unverified claims) → processes, nodes and their interfaces. Performs no I/O.
 
 Only ``ros_discovery_info`` says which node owns an endpoint. Where its list is missing, a participant with one
 node owns its endpoints, and parameter services give the names of nodes (programs that publish no list, or one that this

@@ -36,7 +36,7 @@ _OF_RCLPY = (
 
 
 class Observer(Protocol):
-    """What both have."""
+    """Common parts of both observers."""
 
     def poll(self) -> int: ...
 
@@ -49,7 +49,7 @@ class Observer(Protocol):
 
 
 class Where(NamedTuple):
-    """What is observed, and how. ``enclave_directory`` ``None``: without security."""
+    """Subject and manner of an observation. ``enclave_directory`` is ``None`` without security."""
 
     domain_id: int = 0
     source: str = "auto"

@@ -32,7 +32,7 @@ _NO_DURATION = (0, 9223372036854775807)  # unspecified, and rmw's infinite
 
 
 class RclpyObserver:
-    """As ``CycloneObserver``, for the domain and the enclave that rclpy takes from ``ROS_*``. Raises ``ImportError``
+    """Observe as ``CycloneObserver``, in the domain and enclave that rclpy takes from ``ROS_*``. Raises ``ImportError``
     without rclpy, and what rclpy raises where the middleware refuses."""
 
     def __init__(self) -> None:

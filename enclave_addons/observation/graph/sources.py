@@ -161,7 +161,7 @@ def _values(start: StartedNode) -> set[object]:
 
 
 class _BuiltIn:
-    """What every node has, and every one of its sort, under the final names of this one."""
+    """Interfaces that every node of its sort has, under the final names of this node."""
 
     _SORTS = frozenset(BuiltinCondition) - {BuiltinCondition.SIM_TIME, BuiltinCondition.TF_LISTENER}
 

@@ -83,7 +83,7 @@ def _sockets_of(process: str) -> Iterator[str]:
 
 
 def _is_ours(address: str) -> bool:
-    """Return True if this machine (this network namespace) has the address: nobody else can bind it."""
+    """Return True if this machine (this network namespace) has the address, which no other machine can bind."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:

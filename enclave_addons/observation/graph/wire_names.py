@@ -42,7 +42,7 @@ _OF_EVERY_ACTION = ("cancel_goal", "status")  # their types are action_msgs', wh
 
 
 class Part(NamedTuple):
-    """What one DDS endpoint is a part of. ``type`` is empty if this part does not determine it."""
+    """The ROS interface to which one DDS endpoint belongs. ``type`` is empty if this part does not determine it."""
 
     kind: EndpointKind
     name: str

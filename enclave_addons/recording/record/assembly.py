@@ -4,7 +4,8 @@ A process of the record belongs to the process that the supervisor started if it
 parents is: a shell or ``nice`` has another pid than the node behind it. Nodes of a container belong to the components
 that the launch loads into it, by final name and, where names are equal, in the order of the requests. A node that
 no request names is another one of a plugin that gave the same name of its own before (loaded by others), or was
-made by the component before it, in its constructor (loads of one container run one after another); else it is nobody's.
+made by the component before it, in its constructor (loads of one container run one after another), else by no
+component.
 """
 
 from __future__ import annotations

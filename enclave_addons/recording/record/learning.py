@@ -27,7 +27,7 @@ _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ro
 _UNTIL_DECIDED = "all are granted until a run with another value decides"
 
 OBSERVED = "observed"
-"""What ``RequestedNode.started_as`` is for a node of the graph, which says nothing of states."""
+"""Value of ``RequestedNode.started_as`` for a node of the graph, whose states are unknown."""
 
 
 class LearntEndpoint(NamedTuple):

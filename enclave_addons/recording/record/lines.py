@@ -113,7 +113,7 @@ class Ended(NamedTuple):
 
 
 class RecordedRun(NamedTuple):
-    """What was run, said once by the supervisor; ``id`` differs for each run."""
+    """The launch of a run, written once by the supervisor. ``id`` differs for each run."""
 
     id: str
     launch_file: str = ""

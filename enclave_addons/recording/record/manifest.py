@@ -1,4 +1,4 @@
-"""What was learnt of one node → the text of a NoDL v2 document, united with what stood there before. Performs no I/O.
+"""Learnt interfaces of one node → the text of a NoDL v2 document, merged with its previous text. Performs no I/O.
 
 NoDL v2 has no place for a name that comes from a parameter, nor for runs: they are in our section of ``codegen``
 (``nodl.document.v2``), beside a standard entry under the name that was seen. Nothing is removed from a document

@@ -76,7 +76,7 @@ class Source(NamedTuple):
 
 
 class NameOrigin(NamedTuple):
-    """Where a name comes from.
+    """Origin of a name.
 
     ``source`` ``None``: fixed in the program, or from one of ``candidates``. ``proven``: another value was seen to be
     followed, by ``source`` and all ``candidates``; else one run says so. ``default``: the name where the launch sets

@@ -1,4 +1,4 @@
-"""What a recorded node requested, apart from what libraries make for every node, by who called rcl."""
+"""Requests of a recorded node by the caller of rcl, without those that libraries make for every node."""
 
 from __future__ import annotations
 
