@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -91,7 +92,11 @@ def _findings(
         return
     except KeystoreError:
         pass  # the checks below report what cannot be read
-    yield from check_parents(view.root)
+    owner = os.lstat(view.root)
+    for finding in check_parents(view.root):
+        # What belongs to the keystore's own foreign owner is reported with the keystore.
+        if safe_files.is_trusted_owner(owner) or os.stat(finding.place).st_uid != owner.st_uid:
+            yield finding
     yield from check_files(view.root)
     register, problems = load_register(view)
     yield from problems

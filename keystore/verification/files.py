@@ -49,6 +49,7 @@ _UNFINISHED = (layout.STAGING, layout.INCOMING)
 def check_files(root: Path) -> Iterator[Finding]:
     """Check owners, modes, links and strange files below ``root``."""
     names: list[str] = []
+    yield from _check_owner_of_all(root)
     yield from _check_owner(root, ".", os.lstat(root), private=False)
     for relative, info in _walk(root, ""):
         if stat.S_ISLNK(info.st_mode):
@@ -175,14 +176,31 @@ def _belongs(root: Path, directory: str, name: str) -> bool:
     return name == layout.KEY_URI and not os.path.lexists(root / directory / layout.KEY)
 
 
+def _check_owner_of_all(root: Path) -> Iterator[Finding]:
+    """Report a keystore of another user once: every file of it would be reported for the same reason."""
+    owner = os.lstat(root).st_uid
+    if owner not in (0, os.geteuid()):
+        as_owner = f"sudo -u '#{owner}' secure-keystore verify {shlex.quote(str(root))}"
+        yield Finding(
+            Severity.ERROR, "foreign-owner", ".",
+            f"this keystore belongs to user {owner}, who can change it at any time, and you are user {os.geteuid()}",
+            f"chown -R {os.geteuid()} {shlex.quote(str(root))}  # or check it as its owner: {as_owner}",
+        )  # fmt: skip
+
+
 def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bool) -> Iterator[Finding]:
     """Check what is not secret: it must be ours or the administrator's all the same."""
     path = root / relative
+    is_of_owner = (
+        info.st_uid == os.lstat(root).st_uid
+    )  # and reported with the whole keystore, if that is another's
     problem = safe_files.private_problem(path, info) if private else None
+    if problem is not None and is_of_owner and info.st_uid != os.geteuid():
+        problem = None
     if problem is not None:
         fix = safe_files.private_repair(path, info)
         yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, fix)
-    elif not private and not safe_files.is_trusted_owner(info):
+    elif not private and not is_of_owner and not safe_files.is_trusted_owner(info):
         yield Finding(
             Severity.ERROR, "foreign-owner", relative,
             f"belongs to user {info.st_uid}, who can change it at any time",

@@ -13,7 +13,7 @@ from keystore.disk.crl_file import crl_problem
 from keystore.disk.deployed import deployed_manifest
 from keystore.disk.register_file import describe, foreign_authorities, needs_register, read_register
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError
+from keystore.errors import KeystoreError, UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -27,6 +27,8 @@ def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
     """Load the register, or say why there is none where one belongs."""
     try:
         register = read_register(view.root)
+    except UnsafeKeystoreError:
+        return None, []  # the check of all files names it, with what to do about it
     except KeystoreError as error:
         return None, [Finding(Severity.ERROR, "register", layout.REGISTER, str(error), repair.BACKUP)]
     if register is None and needs_register(view):
