@@ -59,7 +59,7 @@ _MODULE_PATH = re.compile(r"[?&]module-path=([^&]+)")
 
 
 @dataclass(frozen=True)
-class Cause:
+class SilenceCause:
     """What keeps processes silent. ``step`` is one of ``STEPS``; ``repair`` works on this machine."""
 
     step: str
@@ -73,7 +73,7 @@ class Diagnosis:
 
     keystore: Path
     passed: tuple[str, ...]
-    cause: Cause | None
+    cause: SilenceCause | None
 
 
 def diagnose(
@@ -98,7 +98,7 @@ def diagnose(
         findings = [one for one in verify(keystore).findings if _concerns(one, enclave)]
     except StorageError as error:
         text = "run it as the user of the processes, who must be able to read the keystore"
-        return Diagnosis(keystore, ("clock",), Cause("owner", str(error), text))
+        return Diagnosis(keystore, ("clock",), SilenceCause("owner", str(error), text))
     asked = _Asked(view, enclave, environment, working_directory, findings)
     passed: list[str] = []
     for step in STEPS:
@@ -131,12 +131,12 @@ class _Asked:
     working_directory: Path
     findings: list[Finding]
 
-    def causes(self, step: str) -> Iterator[Cause]:
+    def causes(self, step: str) -> Iterator[SilenceCause]:
         """Yield the causes of one step."""
         for one in self.findings:
             if _STEP_OF_CODE.get(one.code, "files") == step and self._silences(one):
-                yield Cause(step, f"{printable(one.place)}: {one.message}", one.repair)
-        own: dict[str, Callable[[], Iterator[Cause]]] = {
+                yield SilenceCause(step, f"{printable(one.place)}: {one.message}", one.repair)
+        own: dict[str, Callable[[], Iterator[SilenceCause]]] = {
             "domain": self._domain,
             "token": self._token,
             "middleware": self._middleware,
@@ -161,17 +161,17 @@ class _Asked:
     def _enclaves(self) -> Iterable[str]:
         return self.view.enclaves() if self.enclave is None else (self.enclave,)
 
-    def _domain(self) -> Iterator[Cause]:
+    def _domain(self) -> Iterator[SilenceCause]:
         try:
             domain = domain_of(self.environment)
         except UsageError as error:
-            yield Cause("domain", str(error), f"export {DOMAIN}=0")
+            yield SilenceCause("domain", str(error), f"export {DOMAIN}=0")
             return
         for enclave in self._enclaves():
             domains = self._domains_of(enclave)
             if domains is not None and not domains.covers(Domains.single(domain)):
                 first = domains.ranges[0][0]
-                yield Cause(
+                yield SilenceCause(
                     "domain",
                     f"the permissions of {enclave} are for domains {domains}, and {DOMAIN} is {domain}: Cyclone DDS "
                     "refuses the participant there, Fast DDS each endpoint",
@@ -187,7 +187,7 @@ class _Asked:
         except KeystoreError:
             return None  # reported by verify
 
-    def _token(self) -> Iterator[Cause]:
+    def _token(self) -> Iterator[SilenceCause]:
         for enclave in self._enclaves():
             uri = self.view.enclave_file(enclave, layout.KEY_URI)
             if uri is None:
@@ -195,26 +195,26 @@ class _Asked:
             text = uri.decode(errors="replace").strip()
             module = _MODULE_PATH.search(text)
             if self._vendor is Vendor.CYCLONE:
-                yield Cause(
+                yield SilenceCause(
                     "token",
                     f"the key of {enclave} is in a token, which Cyclone DDS 0.10 cannot use",
                     "export RMW_IMPLEMENTATION=rmw_fastrtps_cpp",
                 )
             elif module is not None and not Path(unquote(module[1])).is_file():
-                yield Cause(
+                yield SilenceCause(
                     "token",
                     f"the PKCS#11 module of {enclave} is not here: {printable(unquote(module[1]))}",
                     "install it, or correct module-path in key.p11",
                 )
 
-    def _middleware(self) -> Iterator[Cause]:
+    def _middleware(self) -> Iterator[SilenceCause]:
         if (why := why_not(self._name)) is not None:
             text = f"RMW_IMPLEMENTATION is {printable(self._name)}: {why}"
-            yield Cause("middleware", text, "export RMW_IMPLEMENTATION=rmw_fastrtps_cpp")
+            yield SilenceCause("middleware", text, "export RMW_IMPLEMENTATION=rmw_fastrtps_cpp")
         for one in self.findings if self._vendor is Vendor.CYCLONE else ():
             if one.code in _CYCLONE_REFUSES:
                 text = f"{printable(one.place)}: {one.message}"
-                yield Cause("middleware", text, "export RMW_IMPLEMENTATION=rmw_fastrtps_cpp")
+                yield SilenceCause("middleware", text, "export RMW_IMPLEMENTATION=rmw_fastrtps_cpp")
         if (
             self._name == ZENOH
             and self.enclave is not None
@@ -222,19 +222,19 @@ class _Asked:
         ):
             text = f"{self.enclave} has no session configuration for Zenoh"
             command = f"secure-keystore zenoh {shlex.quote(str(self.view.root))} --enclave {self.enclave}"
-            yield Cause("middleware", text, command)
+            yield SilenceCause("middleware", text, command)
 
-    def _discovery(self) -> Iterator[Cause]:
+    def _discovery(self) -> Iterator[SilenceCause]:
         on_fast = self._vendor is Vendor.FAST
         for found in foreign_configurations(self.environment, self.working_directory, on_fast=on_fast):
             where = printable(str(self.working_directory))
             gone = (
                 f"unset {found.variable}" if found.variable in self.environment else f"remove it from {where}"
             )
-            yield Cause("discovery", f"{found.variable} {found.why}: {printable(found.value)}", gone)
+            yield SilenceCause("discovery", f"{found.variable} {found.why}: {printable(found.value)}", gone)
         if discovery_is_off(self.environment):
             text = "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: processes meet nobody"
-            yield Cause("discovery", text, "export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET")
+            yield SilenceCause("discovery", text, "export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET")
 
 
 def keystore_and_enclave(words: list[str]) -> tuple[Path, str | None]:

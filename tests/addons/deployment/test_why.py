@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_addons.deployment.diagnosis import STEPS, Cause, diagnose
+from enclave_addons.deployment.diagnosis import STEPS, SilenceCause, diagnose
 from keystore import Domains, verify
 from keystore.formats.validity import utc_now
 from keystore.verb import main
@@ -20,7 +20,7 @@ FAST = {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}
 CYCLONE = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
 
 
-def cause(root: Path, enclave: str | None = None, **environment: str) -> Cause:
+def cause(root: Path, enclave: str | None = None, **environment: str) -> SilenceCause:
     found = diagnose(root, enclave, {**FAST, **environment}, root.parent)
     assert found.cause is not None
     assert list(found.passed) == list(STEPS[: STEPS.index(found.cause.step)])
