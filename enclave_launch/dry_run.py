@@ -179,6 +179,14 @@ class Diagnostic(_Strict, frozen=True):
         return str(SourceLocation(self.file or "", self.line if self.file else 0))
 
 
+class Hanging(_Strict, frozen=True):
+    """A difference between versions that this launch file depends on."""
+
+    what: str
+    package: str
+    since: str = _described("the version of the package that brought it")
+
+
 class Release(_Strict, frozen=True):
     """The rules that were followed."""
 
@@ -186,6 +194,9 @@ class Release(_Strict, frozen=True):
     versions: dict[str, str] = _described("the version of each package whose changes matter")
     assumed: list[str] = _described(
         "the packages that are not installed: their newest known version is taken"
+    )
+    hanging: list[Hanging] = Field(
+        [], description="what in this launch file hangs on the versions that are assumed"
     )
 
 

@@ -18,6 +18,7 @@ from enclave_launch.host.host import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.policy.node_permissions import ALSO
+from enclave_launch.ros_rules.distro import Versions
 from keystore.errors import KeystoreError
 from keystore.formats.policy_xml import read_policies
 from keystore.steps.options import ProvisionOptions
@@ -35,6 +36,7 @@ class ResolveOptions:
         manifests: NoDL documents or folders; they win where definitions conflict.
         policy: An SROS2 policy whose rules are granted beside the derived ones.
         distro: The release of ROS; ``None`` is ``ROS_DISTRO``, else the newest.
+        versions: Versions of the packages of ``distro``, as ``read_versions`` reads them.
         infer: Analyse the sources of nodes without a manifest.
         library: Use the library for nodes without a manifest.
         library_folders: Folders of library documents, which come first.
@@ -46,6 +48,7 @@ class ResolveOptions:
     manifests: tuple[Path, ...] = ()
     policy: Path | None = None
     distro: str | None = None
+    versions: Versions = ()
     enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
     infer: bool = True
     library: bool = True
@@ -70,7 +73,7 @@ class ResolveOptions:
 
     def host_options(self) -> HostOptions:
         """Return the options of the evaluation's host, the same in a dry run and live."""
-        return HostOptions(self.distro, self.allow_missing_packages, self.no_python)
+        return HostOptions(self.distro, self.allow_missing_packages, self.no_python, versions=self.versions)
 
     def plan_options(self) -> PlanOptions:
         """Return the options of planning; raises ``UsageError`` for a policy file that cannot be used."""

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.ros_rules.distro import DEFAULT, Release, release_of
+from enclave_launch.ros_rules.distro import DEFAULT, Release, Since, release_of
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 
@@ -154,6 +154,7 @@ class Evaluation(NamedTuple):
     warnings: tuple[Diagnostic, ...] = ()
     release: Release = release_of(DEFAULT)  # whose rules were followed
     reactions: tuple[Reaction, ...] = ()
+    uncertain: tuple[Since, ...] = ()  # what was asked of the release and hangs on versions that are assumed
 
     @property
     def distro(self) -> str:

@@ -147,7 +147,8 @@ def _is_available(name: str, module: str) -> bool:
     if gate is None or (module and module not in PATHS):
         return True
 
-    return current_release().has(gate)
+    release = current_release()
+    return release.has(gate) if module else gate in release.features  # a list of names asks for none of them
 
 
 def upstream_name(module: str, name: str) -> str:

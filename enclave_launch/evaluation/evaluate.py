@@ -147,6 +147,7 @@ def _evaluation(host: PlanHost) -> Evaluation:
         tuple(host.warnings),
         host.release,
         tuple(host.reactions),
+        host.release.uncertain(),
     )
 
 

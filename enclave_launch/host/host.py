@@ -26,7 +26,7 @@ from enclave_launch.diagnostics.evaluation import (
     ros_distro_unknown,
 )
 from enclave_launch.host.environment import environment_snapshot
-from enclave_launch.ros_rules.distro import Distro, choose_release
+from enclave_launch.ros_rules.distro import Distro, Versions, WatchedRelease, choose_release
 from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 from nodl import ament_index
 from nodl.ament_index import MISSING_PREFIX
@@ -48,6 +48,7 @@ class HostOptions(NamedTuple):
     """Properties of the world that an evaluation knows, in a dry run and live.
 
     ``distro``: whose rules to follow, as in ``--distro``, ``None`` for that of the environment.
+    ``versions``: those of the packages of that distribution, in the place of installed ones.
     ``anonymous_seed``: two hosts with the same
     seed give the same names at random, in the same order.
     """
@@ -56,6 +57,7 @@ class HostOptions(NamedTuple):
     allow_missing_packages: bool = False
     no_python: bool = False
     anonymous_seed: int | None = None
+    versions: Versions = ()
 
 
 _PACKAGE_MISSING = re.compile(r"package '([A-Za-z0-9_]+)' not found")  # as ament_index_python says it
@@ -117,7 +119,9 @@ class Host(ABC):
 
     def __init__(self, options: HostOptions, user_code_results: UserCodeResults | None = None) -> None:
         named = os.environ.get("ROS_DISTRO")
-        self.release = choose_release(options.distro, named, ament_index.search_prefixes())
+        self.release = WatchedRelease.of(
+            choose_release(options.distro, named, ament_index.search_prefixes(), options.versions)
+        )
         self.allow_missing_packages = options.allow_missing_packages
         self.no_python = options.no_python
         self.user_code_results = user_code_results

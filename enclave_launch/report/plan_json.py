@@ -10,9 +10,9 @@ from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.node_permissions import Reason
-from enclave_launch.process import LauncherCall, Reaction, RemapRule
+from enclave_launch.process import Evaluation, LauncherCall, Reaction, RemapRule
 from enclave_launch.report.unknown import label, unknown_by_enclave
-from enclave_launch.ros_rules.distro import PACKAGES, Release
+from enclave_launch.ros_rules.distro import since_text
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
 from keystore.formats.policy import Qualifier, Rule
@@ -25,7 +25,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
     """Return the plan as plain values; ``security``: how ``--secure`` would start the processes."""
     return {
         "version": VERSION,
-        "release": _release(plan.evaluation.release),
+        "release": _release(plan.evaluation),
         "processes": [_process(item, security) for item in plan.processes],
         "components": [_component(item) for item in plan.components],
         "enclaves": _enclaves(plan),
@@ -40,9 +40,17 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
     }
 
 
-def _release(release: Release) -> dict[str, object]:
-    assumed = [package for package in PACKAGES if package not in release.installed]
-    return {"distro": release.distro.value, "versions": release.versions, "assumed": assumed}
+def _release(evaluation: Evaluation) -> dict[str, object]:
+    release = evaluation.release
+    return {
+        "distro": release.distro.value,
+        "versions": release.versions,
+        "assumed": list(release.assumed),
+        "hanging": [
+            {"what": each.what, "package": each.package, "since": since_text(each, release)}
+            for each in evaluation.uncertain
+        ],
+    }
 
 
 def plan_json(plan: LaunchPlan, security: SecuritySettings | None = None) -> str:

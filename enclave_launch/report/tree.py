@@ -13,6 +13,7 @@ from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.terminal_style import TerminalStyle
 from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_enclave
+from enclave_launch.ros_rules.distro import since_text
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy
 
@@ -30,7 +31,7 @@ class Branch(NamedTuple):
 def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
     """Format the plan as a tree; interfaces that every node has are counted, not listed."""
     style = style or TerminalStyle()
-    lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {plan.evaluation.release})"), "", "    ")
+    lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {as_evaluated(plan)})"), "", "    ")
     gains = gains_by_sharing(plan.derived, composed_only=True)
     lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves], style)
     outside = _outside(plan)
@@ -39,6 +40,16 @@ def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
     lines += style.listed("error under --secure", plan.problems)
     lines += style.listed("warning", plan.warnings)
     return "\n".join(lines) + "\n"
+
+
+def as_evaluated(plan: LaunchPlan) -> str:
+    """Return whose rules were followed, and what in this launch file hangs on versions that are assumed."""
+    release = plan.evaluation.release
+    hanging = [
+        f"{each.what} (since {each.package} {since_text(each, release)})"
+        for each in plan.evaluation.uncertain
+    ]
+    return "; ".join([str(release), *([f"hanging on them: {', '.join(hanging)}"] if hanging else [])])
 
 
 def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) -> Branch:

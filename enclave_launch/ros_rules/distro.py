@@ -244,7 +244,8 @@ def version_text(version: Version) -> str:
 class Release(NamedTuple):
     """A distribution with the versions of the packages in the table; asks the table.
 
-    ``installed``: the packages whose version was read. Those of the others are assumed.
+    ``installed``: the packages whose version was read. ``given``: those whose version a file of versions has. The
+    versions of the others are assumed.
     """
 
     distro: Distro
@@ -253,9 +254,23 @@ class Release(NamedTuple):
     rcl: Version
     features: frozenset[Since]
     installed: frozenset[str] = frozenset()
+    given: frozenset[str] = frozenset()
 
     def has(self, feature: Since) -> bool:
         return feature in self.features
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Return the packages whose version is not known."""
+        return tuple(package for package in PACKAGES if package not in self.installed | self.given)
+
+    def hangs_on(self, feature: Since) -> bool:
+        """Return True if another version of an assumed package would answer differently, within the distribution."""
+        first = feature.first_in(self.distro)
+        return feature.package in self.assumed and first is not None and first > self._oldest(feature.package)
+
+    def _oldest(self, package: str) -> Version:
+        return _version(_RELEASES[self.distro][package].split()[0])
 
     @property
     def versions(self) -> dict[str, str]:
@@ -266,9 +281,41 @@ class Release(NamedTuple):
         """Return the distribution and the versions in words, as for the first line of a plan."""
         groups: dict[str, list[str]] = {}
         for package, version in self.versions.items():
-            how = "installed" if package in self.installed else "assumed"
+            how = (
+                "assumed"
+                if package in self.assumed
+                else "installed"
+                if package in self.installed
+                else "given"
+            )
             groups.setdefault(how, []).append(f"{package} {version}")
         return "; ".join([self.distro.value, *(f"{how}: {', '.join(of)}" for how, of in groups.items())])
+
+
+def since_text(feature: Since, release: Release) -> str:
+    """Return the version that brought ``feature`` to the distribution of ``release``; empty if none did."""
+    first = feature.first_in(release.distro)
+    return "" if first is None else version_text(first)
+
+
+class WatchedRelease(Release):
+    """A release that records which features it is asked for."""
+
+    asked: set[Since]
+
+    @classmethod
+    def of(cls, release: Release) -> WatchedRelease:
+        watched = cls(*release)
+        watched.asked = set()
+        return watched
+
+    def has(self, feature: Since) -> bool:
+        self.asked.add(feature)
+        return super().has(feature)
+
+    def uncertain(self) -> tuple[Since, ...]:
+        """Return the features among them that other versions of assumed packages would not have, or would have."""
+        return tuple(sorted(each for each in self.asked if self.hangs_on(each)))
 
 
 @lru_cache(maxsize=32)
@@ -279,16 +326,27 @@ def release_of(
     rcl: Version | None = None,
     *,
     day: str = "",
+    are_given: bool = False,
 ) -> Release:
     """Return the release of ``distro`` with these versions, by default the newest known until ``day``.
+
+    ``are_given``: the versions are from a file, not from installed packages.
 
     Raises ``ValueError`` if no version of that time is known.
     """
     given = dict(zip(PACKAGES, (launch, launch_ros, rcl), strict=True))
     versions = {package: given[package] or _newest(distro, package, day) for package in PACKAGES}
     features = frozenset(each for each in Feature if _has(each, distro, versions[each.package]))
-    installed = frozenset(package for package in PACKAGES if given[package])
-    return Release(distro, versions["launch"], versions["launch_ros"], versions["rcl"], features, installed)
+    known = frozenset(package for package in PACKAGES if given[package])
+    return Release(
+        distro,
+        versions["launch"],
+        versions["launch_ros"],
+        versions["rcl"],
+        features,
+        installed=frozenset() if are_given else known,
+        given=known if are_given else frozenset(),
+    )
 
 
 def _newest(distro: Distro, package: str, day: str) -> Version:
@@ -310,13 +368,50 @@ def moves_whole_actions(distro: str, rcl: Version | None = None) -> bool:
     return distro in list(Distro) and release_of(Distro(distro), rcl=rcl).has(Feature.WHOLE_ACTIONS)
 
 
-def choose_release(name: str | None, environment_name: str | None, prefixes: Sequence[str] = ()) -> Release:
+Versions = tuple[tuple[str, str], ...]
+"""Packages with the version of each."""
+
+_PACKAGE_OF_ROS = re.compile(r"(?<![\w-])ros-([a-z]+)-([a-z0-9-]+?)(?::\w+)?\s+(\d+(?:\.\d+)+)")
+
+
+def read_versions(text: str) -> tuple[Distro, Versions]:
+    """Read the versions of a robot: the output of ``dpkg -l`` there, or of ``secure-plan doctor --versions``.
+
+    Raises ``ValueError`` if it names no package of the table, or those of two distributions.
+    """
+    known = {distro.value: distro for distro in Distro}
+    found: dict[Distro, dict[str, str]] = {}
+    for name, package, version in _PACKAGE_OF_ROS.findall(text):
+        if name in known and (module := package.replace("-", "_")) in PACKAGES:
+            found.setdefault(known[name], {})[module] = version
+    if len(found) != 1:
+        several = f"packages of {' and '.join(found)}" if found else "no package such as ros-jazzy-launch"
+        raise ValueError(
+            f"it lists {several}; make it with dpkg -l on the robot, or secure-plan doctor --versions"
+        )
+    ((distro, versions),) = found.items()
+    return distro, tuple(versions.items())
+
+
+def list_versions(release: Release) -> str:
+    """Return the installed packages as lines that ``read_versions`` reads."""
+    return "".join(
+        f"ros-{release.distro.value}-{package.replace('_', '-')} {release.versions[package]}\n"
+        for package in PACKAGES
+        if package in release.installed
+    )
+
+
+def choose_release(
+    name: str | None, environment_name: str | None, prefixes: Sequence[str] = (), versions: Versions = ()
+) -> Release:
     """Return the release of ``--distro``, else ``ROS_DISTRO``, else the newest distribution.
 
     Args:
         name: A distribution, or one with a day, month or year: ``jazzy``, ``jazzy@2025-03``.
         environment_name: The value of ``ROS_DISTRO``. An unknown one counts as the newest.
         prefixes: Where installed packages are looked for. Their versions decide, unless ``name`` has a day.
+        versions: Versions that decide in their place.
 
     Returns:
         The release.
@@ -334,6 +429,10 @@ def choose_release(name: str | None, environment_name: str | None, prefixes: Seq
     else:
         known = {distro.value: distro for distro in Distro}
         distro = known.get(environment_name or "", DEFAULT)
+    if versions:
+        texts = dict(versions)
+        given = (_version(texts[package]) if package in texts else None for package in PACKAGES)
+        return release_of(distro, *given, are_given=True)
     return release_of(distro, *(_installed_version(distro, package, prefixes) for package in PACKAGES))
 
 

@@ -6,6 +6,7 @@ import argparse
 import os
 import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from enclave_common.command_line import (
     FLAG,
@@ -22,12 +23,13 @@ from enclave_common.command_line import (
     add_version,
     one_of,
 )
+from enclave_common.files import read_text
 from enclave_common.words import did_you_mean
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.node_permissions import ALSO
-from enclave_launch.ros_rules.distro import DEFAULT, Distro, choose_release
+from enclave_launch.ros_rules.distro import DEFAULT, Distro, Versions, choose_release, read_versions
 from enclave_launch.verb.completion import launch_words
 from enclave_launch.verb.modes import modes
 
@@ -141,6 +143,8 @@ EVALUATION: tuple[Option, ...] = (
      f"ROS distribution to behave like: {', '.join(distro.value for distro in Distro)} (default: ROS_DISTRO, else "
      f"{DEFAULT.value}). Installed packages decide the version, else the newest known patch release, or that of the "
      "date, as in jazzy@2025-03"),
+    ("--versions FILE", PATH,
+     "versions of ROS's packages on the robot: dpkg -l there, or secure-plan doctor --versions (in place of --distro)"),
     ("--allow-missing-packages", FLAG,
      "go on with a marked placeholder for packages that are not installed"),
     ("--no-python", FLAG, "refuse to run Python launch files (they are code)"),
@@ -221,11 +225,16 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
         for path in getattr(options, name):
             if not os.path.exists(path):
                 raise UsageError(f"--{name} {path}: no such file or directory")
+    distro: str | None = options.distro
+    versions: Versions = ()
+    if options.versions is not None:
+        distro, versions = _versions(options.versions, options.distro)
     return ResolveOptions(
         prefixes=tuple(options.prefix),
         manifests=tuple(options.nodl),
         policy=options.policy,
-        distro=options.distro,
+        distro=distro,
+        versions=versions,
         enclave_scope=EnclaveScope(options.enclave_scope),
         infer=options.missing_nodl in ("infer", "analysis"),
         library=options.missing_nodl in ("infer", "library"),
@@ -239,6 +248,17 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
         no_python=options.no_python,
         launch_configurations=_launch_prefix(options),
     )
+
+
+def _versions(file: Path, named: str | None) -> tuple[str, Versions]:
+    with (
+        translated(OSError, UsageError, f"--versions {file}: "),
+        translated(ValueError, UsageError, f"--versions {file}: "),
+    ):
+        distro, versions = read_versions(read_text(file))
+    if named not in (None, distro.value):
+        raise UsageError(f"--versions {file} is of {distro}: it is given in place of --distro {named}")
+    return distro.value, versions
 
 
 def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:

@@ -6,10 +6,14 @@
   secure-plan diff v1.0:launch/robot.launch.xml launch/robot.launch.xml
   secure-plan diff KEYSTORE PACKAGE LAUNCH_FILE              what a keystore has signed, and what the plan asks for
   secure-plan diff KEYSTORE OTHER_KEYSTORE                   what two keystores let each enclave do
+  secure-plan diff --distro humble --against jazzy PACKAGE LAUNCH_FILE     what another release of ROS changes
 
 With a revision, the packages of the repository are planned from their sources, in the revision and in the work tree;
 with --build COMMAND the revision is built instead, and compared with what is installed. Other packages are taken as
 they are installed now; the answer names them. name:=value is for both launch files.
+
+--against compares one launch file with itself, under another distribution (jazzy), the versions of a day
+(jazzy@2025-03), or those of a robot (a file as --versions takes it). It lists what every node has, too.
 
 exit status: 0 no enclave may do more than before, 1 rights grew, 2 wrong usage
 """
@@ -32,16 +36,22 @@ from enclave_common.command_line import TEXT, Option, one_of
 from enclave_common.terminal import json_text, warn
 from enclave_launch.diagnostics import Code
 from enclave_launch.dry_run import DryRun
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, translated
+from enclave_launch.verb.options import distribution
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
-    ("words", plans.WORDS, "what it is compared with"),
+    ("words", {**plans.WORDS, "nargs": "*"}, "what it is compared with"),
 )
 OPTIONS = {
     "": (
         ("--format", one_of("text", "json", "markdown"), "how to print (text)"),
         ("--build COMMAND", TEXT, "build the revision with it, in a copy; leaves install/"),
+        (
+            "--against NAME[@DATE]|FILE",
+            TEXT,
+            "another release of ROS, or the versions of a robot, for the same launch file",
+        ),
     )
 }
 
@@ -51,8 +61,15 @@ _HIDDEN = (Code.MANIFEST_LACKS, Code.MANIFEST_OUTDATED)
 
 def run(options: argparse.Namespace) -> int:
     """Print the difference. Returns 1 when rights grew."""
-    before, after, as_installed = _both(options)
-    changed = changes(before, after)._replace(as_installed=as_installed)
+    if options.against is not None:
+        changed = _against(options)
+    elif options.words:
+        before, after, as_installed = _both(options)
+        changed = changes(before, after)._replace(as_installed=as_installed)
+    else:
+        raise UsageError(
+            "name what it is compared with: a launch file, a plan, a keystore, or --against a release"
+        )
     if options.format == "json":
         sys.stdout.write(json_text(changes_document(changed), indent=2) + "\n")
     else:
@@ -78,6 +95,27 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tupl
         return plan_from_document(read_saved(Path(options.before))), after, ()
     arguments = [word for word in options.words if ":=" in word]
     return plan_from_document(read_plan([options.before, *arguments], options)), after, ()
+
+
+def _against(options: argparse.Namespace) -> Changes:
+    """Compare a launch file with itself under another release."""
+    words = [options.before, *options.words]
+    if options.build or is_saved_plan(words) or revisions.names_revision(options.before):
+        raise UsageError("--against compares one launch file, planned now: PACKAGE LAUNCH_FILE or PATH")
+    other = argparse.Namespace(**vars(options))
+    if os.path.exists(options.against):
+        other.distro, other.versions = None, Path(options.against)
+    else:
+        with translated(argparse.ArgumentTypeError, UsageError, "--against: "):
+            other.distro, other.versions = distribution(options.against), None
+    before, after = (read_plan(words, each) for each in (options, other))
+    changed = changes(plan_from_document(before), plan_from_document(after))
+    named_before, named_after = ({each.fqn for each in plan.launched if each.fqn} for plan in (before, after))
+    return changed._replace(
+        enclaves=tuple(each._replace(built_in=frozenset()) for each in changed.enclaves),
+        nodes_added=tuple(sorted({*changed.nodes_added, *(named_after - named_before)})),
+        nodes_removed=tuple(sorted({*changed.nodes_removed, *(named_before - named_after)})),
+    )
 
 
 def _wanted(plan: DryRun) -> PlanDocument:

@@ -104,12 +104,11 @@ class IncludeLaunchDescription(Action):
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
         _, kwargs = super().parse(entity, parser)
         kwargs["launch_description_source"] = parser.parse_substitution(entity.get_attr("file"))
-        tags = ["arg", "let"] if current_release().has(Feature.LET_IN_INCLUDE) else ["arg"]
-        given = [
-            child
-            for tag in tags
-            for child in entity.get_attr(tag, data_type=list[Entity], optional=True) or ()
-        ]
+        given = list(entity.get_attr("arg", data_type=list[Entity], optional=True) or ())
+        release = current_release()
+        if Feature.LET_IN_INCLUDE in release.features:
+            lets = entity.get_attr("let", data_type=list[Entity], optional=True) or ()
+            given += lets if lets and release.has(Feature.LET_IN_INCLUDE) else ()
         if given:
             parse = parser.parse_substitution
             kwargs["launch_arguments"] = [

@@ -104,7 +104,7 @@ def attributes_of(release: Release) -> tuple[_Attribute, ...]:
     """Parse the optional attributes of a process element, in the order in which upstream reads them."""
     return (
         *_ATTRIBUTES,
-        *(_EXIT_AND_TTY if release.has(Feature.EXIT_AND_TTY_ATTRIBUTES) else ()),
-        *(_TIMEOUTS if release.has(Feature.TIMEOUT_ATTRIBUTES) else ()),
+        *(_EXIT_AND_TTY if Feature.EXIT_AND_TTY_ATTRIBUTES in release.features else ()),
+        *(_TIMEOUTS if Feature.TIMEOUT_ATTRIBUTES in release.features else ()),
         _ENVIRONMENT,
     )

@@ -177,10 +177,9 @@ def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
 
 def _matching_patterns(sections: Mapping[str, Any], section: str) -> list[str]:
     """Return sections with wildcards that match, in the order of the file. Older releases ignore them."""
-    if not current_release().has(Feature.WILDCARD_SECTIONS):
-        return []
     tokens = section.split("/")
-    return [name for name in sections if name != "**" and "*" in name and section_applies(name, tokens)]
+    found = [name for name in sections if name != "**" and "*" in name and section_applies(name, tokens)]
+    return found if found and current_release().has(Feature.WILDCARD_SECTIONS) else []
 
 
 def _sections(mapping: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:

@@ -98,7 +98,7 @@ def test_a_saved_plan_of_a_revision(repository: Path, capsys: pytest.CaptureFixt
         ("nosuch:", "no such revision: nosuch"),
         ("HEAD:launch/other.launch.xml", "launch/other.launch.xml is not in revision HEAD"),
         ("HEAD:../../etc/passwd", "is not in revision HEAD"),
-        ("--output=x:", "required"),
+        ("--output=x:", "unrecognized arguments"),
     ],
 )
 def test_what_there_is_not_is_wrong_usage(
