@@ -34,12 +34,7 @@ class InvalidNameError(ValueError):
         self.reason = reason
         self.position = position
         where = "" if position is None else f" (character {position + 1})"
-        super().__init__(f"invalid {what} {shown(name)}: {reason}{where}")
-
-
-def shown(name: str) -> str:
-    """Quote ``name`` with control characters escaped, so that it cannot play tricks in a terminal."""
-    return quoted(name)
+        super().__init__(f"invalid {what} {quoted(name)}: {reason}{where}")
 
 
 def validate_node_name(name: str) -> None:
@@ -132,7 +127,7 @@ def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> 
         try:
             validate_full_name(expanded, what)
         except InvalidNameError as error:
-            raise InvalidNameError(what, name, f"becomes {shown(expanded)}, which {error.reason}") from error
+            raise InvalidNameError(what, name, f"becomes {quoted(expanded)}, which {error.reason}") from error
     return expanded
 
 
@@ -175,7 +170,7 @@ def _check_absolute(what: str, name: str, maximum: int) -> None:
 def _check_characters(what: str, name: str, allowed: str) -> None:
     for position, character in enumerate(name):
         if not (character.isascii() and (character.isalnum() or character == "_" or character in allowed)):
-            raise InvalidNameError(what, name, f"must not contain {shown(character)}", position)
+            raise InvalidNameError(what, name, f"must not contain {quoted(character)}", position)
 
 
 def _check_tokens(what: str, name: str) -> None:

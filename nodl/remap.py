@@ -15,7 +15,8 @@ from contextlib import suppress
 from enum import Enum
 from typing import NamedTuple
 
-from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
+from enclave_common.terminal import quoted
+from nodl.names import InvalidNameError, expand_name, join, validate_full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart
 _NAME = re.compile(rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*\Z")
@@ -51,7 +52,7 @@ class InvalidRemapRuleError(ValueError):
         self.reason = reason
         self.origin = origin
         where = f"{origin}: " if origin else ""
-        super().__init__(f"{where}invalid remap rule {shown(rule)}: {reason}")
+        super().__init__(f"{where}invalid remap rule {quoted(rule)}: {reason}")
 
 
 class ParsedRule(NamedTuple):
@@ -243,8 +244,8 @@ def _check(pattern: re.Pattern[str], value: str, what: str) -> None:
     if not value:
         raise ValueError(f"{what} is empty")
     if "__" in value:
-        raise ValueError(f"{what} {shown(value)} contains '__', which rcl does not allow in rules")
+        raise ValueError(f"{what} {quoted(value)} contains '__', which rcl does not allow in rules")
     if "*" in value or "\\" in value:
-        raise ValueError(f"{what} {shown(value)} uses a pattern, which rcl has not implemented")
+        raise ValueError(f"{what} {quoted(value)} uses a pattern, which rcl has not implemented")
     if not pattern.match(value):
-        raise ValueError(f"{what} {shown(value)} is not a valid name")
+        raise ValueError(f"{what} {quoted(value)} is not a valid name")

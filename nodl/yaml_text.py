@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import yaml
 
+from enclave_common.terminal import quoted
 from enclave_common.yaml_reader import compose_yaml, construct, line_of
 from nodl.errors import InvalidYAMLError
-from nodl.names import shown
 from nodl.source_ref import SourceRef
 
 MAX_BYTES = 1_000_000
@@ -130,7 +130,7 @@ class _Builder:
             if key in result.items and not self._last_counts:
                 raise InvalidYAMLError.at(
                     self._at(key_node),
-                    f"key {shown(key)} is given twice, first on line {result.keys[key].line}",
+                    f"key {quoted(key)} is given twice, first on line {result.keys[key].line}",
                 )
             result.items[key] = value
             result.keys[key] = self._at(key_node)
@@ -160,11 +160,11 @@ class _Builder:
         if node.tag == "tag:yaml.org,2002:timestamp":
             return YamlScalar(text, source)
         if node.tag not in _SCALAR_TAGS:
-            raise InvalidYAMLError.at(source, f"tag {shown(node.tag)} is not allowed")
+            raise InvalidYAMLError.at(source, f"tag {quoted(node.tag)} is not allowed")
         try:
             return YamlScalar(construct(node), source)
         except (ValueError, OverflowError, yaml.YAMLError):
-            raise InvalidYAMLError.at(source, f"{shown(text[:40])} is not a number we can read") from None
+            raise InvalidYAMLError.at(source, f"{quoted(text[:40])} is not a number we can read") from None
 
     def _at(self, node: yaml.Node) -> SourceRef:
         return SourceRef(self._file, line_of(node))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
+from enclave_common.terminal import quoted
 from nodl.errors import InvalidNoDLDocumentError
-from nodl.names import shown
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 Checker = Callable[[YamlValue, str], None]
@@ -25,7 +25,7 @@ def text_of(pattern: str | None = None, meaning: str = "") -> Checker:
         if not isinstance(value, YamlScalar) or not isinstance(value.value, str):
             fail(value, f"{what} must be text")
         elif compiled and not compiled.search(value.value):
-            fail(value, f"{what} {shown(value.value)} is not {meaning}")
+            fail(value, f"{what} {quoted(value.value)} is not {meaning}")
 
     return check
 
@@ -110,7 +110,7 @@ def map_of(
             if checker is None:
                 known = ", ".join(keys or ())
                 raise InvalidNoDLDocumentError.at(
-                    value.keys[name], f"{what} has no key {shown(name)}; known: {known}"
+                    value.keys[name], f"{what} has no key {quoted(name)}; known: {known}"
                 )
             checker(each, name if what == "the document" else f"{what}.{name}")
         if also:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from enclave_common.terminal import quoted
 from enclave_common.xml_tree import XmlElement
 from nodl.document.v2_schema import plain_types
 from nodl.errors import (
@@ -20,7 +21,6 @@ from nodl.errors import (
 from nodl.name_template import NameTemplate
 from nodl.names import (
     InvalidNameError,
-    shown,
     split_fqn,
     validate_full_name,
     validate_node_name,
@@ -53,7 +53,7 @@ def parse_v1(text: bytes, file: str, package: str | None = None) -> tuple[Manife
     version = root.get("version", "")
     if version != str(VERSION):
         raise UnsupportedInterfaceError.at(
-            _at(root, file), f"interface version {shown(version)} is not supported, only {VERSION} is"
+            _at(root, file), f"interface version {quoted(version)} is not supported, only {VERSION} is"
         )
     nodes = tuple(_node(element, file, package) for element in root)
     if not nodes:
@@ -67,7 +67,7 @@ def _node(element: XmlElement, file: str, package: str | None) -> ManifestNode:
     executable = element.get("executable", "")
     if not executable or not executable.isprintable():
         raise InvalidElementError.at(
-            _at(element, file), f"executable {shown(executable)} is not a program name"
+            _at(element, file), f"executable {quoted(executable)} is not a program name"
         )
     if not len(element):
         raise InvalidNoDLDocumentError.at(_at(element, file), f"node {name} describes no interface at all")
@@ -122,7 +122,7 @@ def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint
     name, role = element.get("name", ""), element.get("role", "")
     if role not in _ROLES[tag]:
         raise InvalidNoDLDocumentError.at(
-            _at(element, file), f"role {shown(role)} of <{tag}> must be one of {', '.join(_ROLES[tag])}"
+            _at(element, file), f"role {quoted(role)} of <{tag}> must be one of {', '.join(_ROLES[tag])}"
         )
     try:
         validate_written_name(name, f"{tag} name")
@@ -153,7 +153,7 @@ def _expect(element: XmlElement, tag: str, attributes: tuple[str, ...], file: st
         if attribute not in attributes and attribute not in _ALLOWED_ANYWHERE:
             raise InvalidNoDLDocumentError.at(_at(element, file), f"<{tag}> has no attribute {attribute!s}")
     if element.text:  # the schema knows none; some there is mostly a tag that lost its bracket
-        why = f"<{element.tag}> holds the text {shown(element.text[:40])}, which has no meaning"
+        why = f"<{element.tag}> holds the text {quoted(element.text[:40])}, which has no meaning"
         raise InvalidNoDLDocumentError.at(_at(element, file), why)
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.files import read_bytes
+from enclave_common.terminal import quoted
 from nodl.ament_index import INDEX_FOLDER, find_resource
 from nodl.document.v2_schema import check_document
 from nodl.errors import IncludeError
-from nodl.names import shown
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import MAX_BYTES, YamlMap, parse_yaml
 
@@ -53,7 +53,7 @@ class _Walk:
         if path in self._visited:
             raise IncludeError.at(
                 source,
-                f"{shown(ref)} includes a document a second time: "
+                f"{quoted(ref)} includes a document a second time: "
                 f"{' > '.join(here)} and {' > '.join(self._visited[path])}",
             )
         if len(here) > MAX_DEPTH:
@@ -70,13 +70,13 @@ class _Walk:
         if scheme == "local":
             return _local(rest, source, origin)
         raise IncludeError.at(
-            source, f"{shown(ref)}: only nodl://<package>/<name> and local://<path> are known"
+            source, f"{quoted(ref)}: only nodl://<package>/<name> and local://<path> are known"
         )
 
     def _from_index(self, body: str, source: SourceRef) -> Path:
         package, _, name = body.partition("/")
         if not _PACKAGE_OR_NAME.match(package) or not _PACKAGE_OR_NAME.match(name):
-            raise IncludeError.at(source, f"{shown('nodl://' + body)} is not nodl://<package>/<name>")
+            raise IncludeError.at(source, f"{quoted('nodl://' + body)} is not nodl://<package>/<name>")
         key = resource_key(package, name)
         prefix = find_resource(RESOURCE_TYPE, key, self._prefixes)
         shipped = COMMON / package / f"{name}.nodl.yaml"
@@ -93,12 +93,12 @@ class _Walk:
 
 def _local(body: str, source: SourceRef, origin: Path) -> Path:
     if body.startswith("/") or "\\" in body or not body.isprintable():
-        raise IncludeError.at(source, f"{shown('local://' + body)} must be a relative path")
+        raise IncludeError.at(source, f"{quoted('local://' + body)} must be a relative path")
     path = (origin.parent / body).resolve()
     root = package_root(origin)
     if not path.is_relative_to(root):
         raise IncludeError.at(
-            source, f"{shown('local://' + body)} is outside of {root}, where its package is"
+            source, f"{quoted('local://' + body)} is outside of {root}, where its package is"
         )
     return path
 

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import NamedTuple
 
+from enclave_common.terminal import quoted
 from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPE_OF, PARAMETER_TYPES, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.errors import InvalidNoDLDocumentError
-from nodl.names import shown
 from nodl.node_interface import ClientLibrary, Endpoint, ManifestNode, NodeInterface
 
 _UNKNOWN_QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
@@ -88,7 +88,7 @@ def _v2_type(node: ManifestNode, written: str) -> str:
     if known is None:
         raise InvalidNoDLDocumentError.at(
             node.interface.source,
-            f"parameter type {shown(written)} is unknown in v2; write one of {', '.join(PARAMETER_TYPES)}",
+            f"parameter type {quoted(written)} is unknown in v2; write one of {', '.join(PARAMETER_TYPES)}",
         )
     return known
 
@@ -96,7 +96,9 @@ def _v2_type(node: ManifestNode, written: str) -> str:
 def _v2_name(endpoint: Endpoint) -> str:
     name = endpoint.name.text  # for v1's /node/x this is ~/x, which v2 can say
     if not endpoint.name.is_literal or not re.search(NAME_PATTERN, name):
-        raise InvalidNoDLDocumentError.at(endpoint.source, f"name {shown(name)} cannot be written in NoDL v2")
+        raise InvalidNoDLDocumentError.at(
+            endpoint.source, f"name {quoted(name)} cannot be written in NoDL v2"
+        )
     return _scalar(name)
 
 
@@ -104,7 +106,7 @@ def _v2_endpoint_type(endpoint: Endpoint) -> str:
     if not re.search(TYPE_PATTERN, endpoint.type):
         raise InvalidNoDLDocumentError.at(
             endpoint.source,
-            f"type {shown(endpoint.type)} is not an interface type such as std_msgs/msg/String",
+            f"type {quoted(endpoint.type)} is not an interface type such as std_msgs/msg/String",
         )
     return endpoint.type
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
 from enclave_common.files import read_bytes
+from enclave_common.terminal import quoted
 from enclave_common.xml_tree import XmlElement
 from nodl.builtin_interfaces import DISTROS
 from nodl.dependence import Situation
 from nodl.errors import InvalidXMLError
-from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
@@ -168,7 +168,7 @@ def _of_node(element: XmlElement, place: SourceRef, situation: Situation) -> Ite
             goals = str(situation.parameters.get("goals_updater_topic", "goals_update"))
             yield _named(EndpointKind.SUBSCRIPTION, goals, "nav_msgs/msg/Goals", tag, place)
     elif tag not in _SILENT:
-        yield Gap(place, f"what the node {shown(tag)} of the behavior tree uses is not known")
+        yield Gap(place, f"what the node {quoted(tag)} of the behavior tree uses is not known")
 
 
 def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceRef) -> Endpoint | Gap:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
 from enclave_common.files import read_bytes
-from nodl.names import shown
+from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 
@@ -129,4 +129,4 @@ def _endpoint(kind: EndpointKind, name: str, type_name: str, key: str, written: 
 
 
 def _not_said(key: str, value: str | None) -> str:
-    return f"it does not say {key}" if value is None else f"{key} is {shown(value)}, which is computed"
+    return f"it does not say {key}" if value is None else f"{key} is {quoted(value)}, which is computed"

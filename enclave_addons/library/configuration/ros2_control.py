@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from enclave_addons.library.configuration.configured import Configured, ConfiguredPlugin
+from enclave_common.terminal import quoted
 from enclave_common.xml_tree import XmlElement
 from nodl.builtin_interfaces import DISTROS
 from nodl.errors import InvalidXMLError
-from nodl.names import shown
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
@@ -29,7 +29,7 @@ def of_robot_description(text: str, place: SourceRef, distro: str) -> Configured
     try:
         root = parse_xml(text, "robot_description")
     except InvalidXMLError as error:
-        begins = shown(text if len(text) <= _QUOTED else f"{text[:_QUOTED]}...")
+        begins = quoted(text if len(text) <= _QUOTED else f"{text[:_QUOTED]}...")
         why = f"the robot_description, which names the hardware components, cannot be read: {error}: {begins}"
         return Configured(gaps=(Gap(place, why),))
     names = map(_node_of, root.iter("ros2_control"))
@@ -45,7 +45,7 @@ def _plugins(root: XmlElement, place: SourceRef) -> Iterator[ConfiguredPlugin]:
         for plugin in plugins:
             if plugin.tag == "plugin":
                 plugin_class = plugin.text.strip()
-                what = f"hardware component {shown(component.get('name'))} of class {shown(plugin_class)}"
+                what = f"hardware component {quoted(component.get('name'))} of class {quoted(plugin_class)}"
                 yield ConfiguredPlugin(what, plugin_class, place, {}, _node_of(component))
 
 

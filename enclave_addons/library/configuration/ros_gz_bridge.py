@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
-from nodl.names import shown
+from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
@@ -46,7 +46,7 @@ def _entry(entry: YamlValue) -> Iterator[Endpoint | Gap]:
     name = fields.get("topic_name") or fields.get("ros_topic_name") or fields.get("gz_topic_name") or ""
     direction = fields.get("direction", "BIDIRECTIONAL")
     if direction not in _DIRECTIONS:
-        yield Gap(entry.source, f"{shown(direction)} is not a direction of a bridge")
+        yield Gap(entry.source, f"{quoted(direction)} is not a direction of a bridge")
         return
     type_name = fields.get("ros_type_name", "")
     yield from _endpoints(_DIRECTIONS[direction], name, type_name, entry.source, "bridge configuration")
@@ -61,7 +61,7 @@ def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
         yield from _endpoints((EndpointKind.SERVICE_SERVER,), name, type_name, place, note)
     elif not at or position == len(rest):
         yield Gap(
-            place, f"{shown(word)} does not describe a bridge: it is not TOPIC@ROS_TYPE{{@,[,]}}GZ_TYPE"
+            place, f"{quoted(word)} does not describe a bridge: it is not TOPIC@ROS_TYPE{{@,[,]}}GZ_TYPE"
         )
     else:
         yield from _endpoints(_DIRECTIONS[_SEPARATORS[rest[position]]], name, type_name, place, note)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
-from nodl.names import shown
+from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.yaml_text import YamlList, YamlMap, YamlValue
 
@@ -58,7 +58,7 @@ def of_sensors(root: YamlValue) -> Configured:
         return Configured(gaps=(Gap(root.source, why),))
     source = _text(common, "msg_source", "0")
     if source not in (_ONLINE, _OF_ROS, _OF_FILE):
-        return Configured(gaps=(Gap(common.source, f"msg_source {shown(source)} is none of rslidar_sdk"),))
+        return Configured(gaps=(Gap(common.source, f"msg_source {quoted(source)} is none of rslidar_sdk"),))
     made = [_RECEIVED] if source == _OF_ROS else []
     for switch, sent in _SENT.items():
         written = _text(common, switch, "false").lower()

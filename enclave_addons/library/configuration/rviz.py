@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from enclave_addons.library.configuration.configured import Configured, ConfiguredPlugin, endpoint_named
-from nodl.names import shown
+from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlMap, YamlScalar, YamlValue
@@ -195,7 +195,7 @@ class _Reading:
         if not kind:
             self.unused.append(f"{item.source}: rviz2 loads nothing for a {what} without Class")
         elif not kind.startswith(_OF_ROS_1):
-            shown_as = f"{what} of class {shown(kind)}"
+            shown_as = f"{what} of class {quoted(kind)}"
             self.plugins.append(ConfiguredPlugin(shown_as, kind, item.source, dict(_properties(item, ""))))
 
 
