@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.actions.events import EmitEvent
+from enclave_launch.description.actions.lifecycle import OnStateTransition
 from enclave_launch.description.actions.processes import OnProcessExit
 from enclave_launch.description.events.event import (
     Event,
@@ -157,7 +158,9 @@ class Explorer:
         for handler in self._context._event_handlers.all():
             if handler.internal or id(handler) in self._fired:
                 continue
-            started = self._host.started[new_from:] if id(handler) in known else self._host.started
+            started: list[Any] = self._host.started[new_from:] if id(handler) in known else self._host.started
+            if isinstance(handler, OnStateTransition) and id(handler) not in known:
+                started = [*started, *self._host.lifecycle_components]
             event = handler.foresee(started)
             self._note(handler, event)
             if event is not None and self._depth >= _LONGEST_CHAIN:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 LaunchContext = Any
 ExecuteLocal = Any
 LifecycleNode = Any
+LifecycleComponent = Any
 
 T = TypeVar("T")
 
@@ -300,6 +301,10 @@ class Host(ABC):
     @abstractmethod
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
         """Ask a started lifecycle node for a transition. Does not wait."""
+
+    @abstractmethod
+    def watch_states(self, component: LifecycleComponent, context: LaunchContext) -> None:
+        """Emit an event for each change of state of a component that launch takes through its states."""
 
     @abstractmethod
     def unforeseeable(self, item: Unforeseeable) -> None:

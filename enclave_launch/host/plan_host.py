@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from enclave_launch.host.host import Completion, Host, HostOptions
 
 if TYPE_CHECKING:
-    from enclave_launch.host.host import ExecuteLocal, LaunchContext, LifecycleNode, UserCodeResults
+    from enclave_launch.host.host import (
+        ExecuteLocal,
+        LaunchContext,
+        LifecycleComponent,
+        LifecycleNode,
+        UserCodeResults,
+    )
     from enclave_launch.process import (
         LauncherCall,
         Reaction,
@@ -36,6 +42,7 @@ class PlanHost(Host):
         self.processes: list[ResolvedProcess] = []
         self.started: list[ExecuteLocal] = []  # action of each process, same order
         self.components: list[ResolvedComponent] = []
+        self.lifecycle_components: list[LifecycleComponent] = []
         self.calls: list[LauncherCall] = []
         self.unforeseen: list[Unforeseeable] = []
         self.reactions: list[Reaction] = []
@@ -68,6 +75,9 @@ class PlanHost(Host):
 
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
         """Do nothing: a dry run starts nothing that could change its state."""
+
+    def watch_states(self, component: LifecycleComponent, context: LaunchContext) -> None:
+        self.lifecycle_components.append(component)
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         self.unforeseen.append(item)

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from enclave_launch.description.actions.lifecycle import LifecycleNode
+from enclave_launch.description.actions.lifecycle import LifecycleComponent, LifecycleNode
 from enclave_launch.description.actions.processes import ExecuteLocal
 from enclave_launch.description.events.lifecycle import StateTransition
 from enclave_launch.description.launch_context import LaunchContext
@@ -139,6 +139,14 @@ class LiveHost(Host):
         services.watch_state(
             process.fqn, lambda message: context.emit_event_sync(StateTransition(action=node, msg=message))
         )
+
+    def watch_states(self, component: LifecycleComponent, context: LaunchContext) -> None:
+        services = self._services()
+        if services is not None:
+            services.watch_state(
+                component.node_name,
+                lambda message: context.emit_event_sync(StateTransition(action=component, msg=message)),
+            )
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Do nothing: only a plan has to say so, here it simply happens."""

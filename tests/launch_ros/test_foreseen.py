@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from enclave_launch.policy.launcher import launcher_node
 from enclave_launch.process import Evaluation
 
 Evaluate = Callable[..., Evaluation]
@@ -77,6 +78,52 @@ def test_lifecycle_tags_where_the_release_has_them(launched: Evaluate) -> None:
     assert [component.fqn for component in result.components] == ["/m"]
     with pytest.raises(Exception, match="Unrecognized entity of the type: lifecycle_node"):
         launched(text, distro="jazzy@2026-06")
+
+
+COMPONENTS = """
+from launch import LaunchDescription
+from launch.actions import LogInfo, RegisterEventHandler
+from launch_ros.actions import ComposableNodeContainer, Node
+from launch_ros.descriptions import ComposableLifecycleNode
+from launch_ros.event_handlers import OnStateTransition
+
+def generate_launch_description():
+    component = ComposableLifecycleNode(package="pk", plugin="P", {component})
+    container = ComposableNodeContainer(
+        package="rc", executable="cc", name="box", namespace="/r", composable_node_descriptions=[component])
+    after = OnStateTransition(goal_state="active", entities=[Node(package="pk", executable="e", name="next")])
+    return LaunchDescription([container, RegisterEventHandler(after)])
+"""
+
+
+def test_an_autostarted_component_is_taken_through_its_states_by_the_launcher(launched: Evaluate) -> None:
+    text = COMPONENTS.format(component='name="cam", namespace="/r", autostart=True')
+    found = launched(text, syntax="py", distro="kilted")
+    assert [call.service for call in found.launcher_calls] == [
+        "/r/box/_container/load_node",
+        "/r/cam/change_state",
+    ]
+    assert [process.name for process in found.processes] == ["box", "next"], (
+        "what waits for its state is foreseen"
+    )
+    assert not found.unforeseeable
+    launcher = launcher_node(found.launcher_calls)
+    names = {str(endpoint.name) for endpoint in launcher.interface.endpoints}
+    assert {"/r/cam/change_state", "/r/cam/transition_event"} <= names
+
+
+def test_a_component_without_autostart_is_left_alone(launched: Evaluate) -> None:
+    text = COMPONENTS.format(component='name="cam", namespace="/r"')
+    found = launched(text, syntax="py", distro="kilted")
+    assert [call.service for call in found.launcher_calls] == ["/r/box/_container/load_node"]
+    assert [process.name for process in found.processes] == ["box"]
+
+
+def test_autostart_of_a_component_without_a_name_is_reported_with_a_remedy(launched: Evaluate) -> None:
+    found = launched(COMPONENTS.format(component="autostart=True"), syntax="py", distro="kilted")
+    what = "autostart of pk/P, whose name only the plugin knows: give it name="
+    assert what in [item.what for item in found.unforeseeable]
+    assert all(item.location.line for item in found.unforeseeable)
 
 
 def test_autostart_is_performed_where_the_release_does_so(launched: Evaluate) -> None:

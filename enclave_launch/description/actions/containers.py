@@ -11,7 +11,7 @@ from enclave_launch.description.actions.components import (
     ComposableNode,
     parse_lifecycle_components,
 )
-from enclave_launch.description.actions.lifecycle import autostart_transition
+from enclave_launch.description.actions.lifecycle import autostarted_component
 from enclave_launch.description.actions.nodes import Node
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity
@@ -31,7 +31,14 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.process import LauncherCall, ProcessKind, RemapRule, ResolvedComponent, UnknownParameters
+from enclave_launch.process import (
+    LauncherCall,
+    ProcessKind,
+    RemapRule,
+    ResolvedComponent,
+    Unforeseeable,
+    UnknownParameters,
+)
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace
 from enclave_launch.ros_rules.parameter_value import ParameterValue
@@ -150,7 +157,13 @@ class LoadComposableNodes(Action):
         for component in components:
             if component.name:  # else the container reports a name that only the plugin knows
                 warn_about_repeats(context, component.fqn, container)
-        return [action for pair in zip(wanted, components, strict=True) for action in _autostart(*pair)]
+        return [
+            autostarted_component(component.fqn, context, component.location)
+            for description, component in zip(wanted, components, strict=True)
+            if isinstance(description, ComposableLifecycleNode)
+            and description.node_autostart
+            and _has_name(component, context)
+        ]
 
     def __container_name(self, context: LaunchContext) -> str:
         if isinstance(self.__target, ComposableNodeContainer):
@@ -197,6 +210,14 @@ class LoadComposableNodes(Action):
         )
 
 
+def _has_name(component: ResolvedComponent, context: LaunchContext) -> bool:
+    """Return whether launch knows which node to take through its states; one without a name is reported."""
+    if not component.name:
+        what = f"autostart of {component.program}, whose name only the plugin knows: give it name="
+        context.host.unforeseeable(Unforeseeable(what, component.location))
+    return bool(component.name)
+
+
 def _performed(context: LaunchContext, substitutions: list[Substitution] | None) -> str | None:
     return None if substitutions is None else perform_substitutions(context, substitutions)
 
@@ -228,9 +249,3 @@ def _values(
         item.name: tuple(item.value) if isinstance(item.value, list) else item.value  # type: ignore[misc]
         for item in to_parameters_list(context, name, namespace, evaluated)
     }
-
-
-def _autostart(description: ComposableNode, component: ResolvedComponent) -> list[LaunchDescriptionEntity]:
-    if not isinstance(description, ComposableLifecycleNode) or not description.node_autostart:
-        return []
-    return [autostart_transition(component.fqn)]

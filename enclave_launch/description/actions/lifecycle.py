@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
@@ -29,6 +30,7 @@ from enclave_launch.description.typed_values import normalize_typed_substitution
 from enclave_launch.host.current import current_release
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, LauncherCall, ProcessKind
 from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.source_location import SourceLocation
 
 _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
@@ -69,10 +71,7 @@ class LifecycleNode(Node):
         self._perform_substitutions(context)
         if UNSPECIFIED_NODE_NAME in self.node_name:
             raise RuntimeError("node_name unexpectedly incomplete for lifecycle node")
-        context.host.launcher_call(
-            LauncherCall(f"{self.node_name}/change_state", _CHANGE_STATE, location_of(self, context))
-        )
-        context.register_event_handler(_ChangeStateHandler(self))
+        _follow_states(self, context, location_of(self, context))
         actions = super().execute(context)
         if not self.__wants_autostart(context):
             return actions
@@ -87,11 +86,36 @@ class LifecycleNode(Node):
         return bool(perform_typed_substitution(context, normalize_typed_substitution(value, bool), bool))
 
 
+@dataclass(frozen=True)
+class LifecycleComponent:
+    """A component that launch takes through its states, as the events of lifecycle nodes see it."""
+
+    node_name: str
+
+
+def autostarted_component(name: str, context: LaunchContext, place: SourceLocation) -> LifecycleTransition:
+    """Let launch follow the states of a loaded component; return what configures and activates it."""
+    component = LifecycleComponent(name)
+    _follow_states(component, context, place)
+    context.host.watch_states(component, context)
+    transition = autostart_transition(name)
+    transition.source_location = place
+    return transition
+
+
+def _follow_states(
+    node: LifecycleNode | LifecycleComponent, context: LaunchContext, place: SourceLocation
+) -> None:
+    """Make launch a client of the node's transitions."""
+    context.host.launcher_call(LauncherCall(f"{node.node_name}/change_state", _CHANGE_STATE, place))
+    context.register_event_handler(_ChangeStateHandler(node))
+
+
 class _ChangeStateHandler(EventHandler):
     event_class: type[Event] | None = ChangeState
     internal = True
 
-    def __init__(self, node: LifecycleNode):
+    def __init__(self, node: LifecycleNode | LifecycleComponent):
         def change_state(context: LaunchContext) -> None:
             request = context.locals.event
             if request.lifecycle_node_matcher(node):
@@ -161,7 +185,7 @@ class OnStateTransition(EventHandler):
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
         """Return the first transition of a started lifecycle node that this handler would answer."""
-        nodes = [action for action in started if isinstance(action, LifecycleNode)]
+        nodes = [action for action in started if isinstance(action, LifecycleNode | LifecycleComponent)]
         if self.__target_lifecycle_node is not None:
             nodes = [self.__target_lifecycle_node] if self.__target_lifecycle_node in nodes else []
         return next(filter(self.matches, _possible_events(nodes)), None)
@@ -177,7 +201,7 @@ class OnStateTransition(EventHandler):
         return f"event == StateTransition and event.action == LifecycleNode({hex(id(self.__target_lifecycle_node))})"
 
 
-def _possible_events(nodes: Sequence[LifecycleNode]) -> Iterator[StateTransition]:
+def _possible_events(nodes: Sequence[LifecycleNode | LifecycleComponent]) -> Iterator[StateTransition]:
     for node in nodes:
         for label, start, goal in _TRANSITIONS:
             message = TransitionEvent(0, Transition(label=label), State(label=start), State(label=goal))
@@ -232,13 +256,15 @@ class LifecycleTransition(Action):
         ids = [_transition_id(perform_substitutions(context, item)) for item in self.__ids]
         requests = {name: [_request(name, transition) for transition in ids] for name in names}
         self.__handlers = {name: [] for name in names}
-        registrations = [
+        registrations: list[LaunchDescriptionEntity] = [
             RegisterEventHandler(self.__after(name, transition, requests[name][step:]))
             for step, transition in enumerate(ids, start=1)
             for name in names
         ]
         for name in names:
             self.__register_failure(context, name)
+        for registration in registrations:
+            registration.source_location = self.source_location
         return [*registrations, *(requests[name][0] for name in names)]
 
     def __after(self, name: str, transition: int, remaining: Sequence[Action]) -> EventHandler:
