@@ -1,10 +1,11 @@
-"""The permissions that each ROS tool needs on a secured robot, as a table that docs/running-systems.md shows.
+"""What each ROS tool needs to work on a secured robot: the one table of it. Pure; docs/running-systems.md shows it.
 
-Recorded and tried on real ROS 2 jazzy: a ``ros2`` command is a node ``/_ros2cli_<pid>`` that publishes ``/rosout`` and
-``/parameter_events`` and serves ``get_type_description`` below its own name (the pid is in it, so a wildcard stands
-there); ``service call`` and ``action send_goal`` make a node named after the interface's type, which serves parameters,
-too; ``param``, even ``get``, is a client of all six parameter services of its target. ``ros_discovery_info`` is granted
-to all, and must not be published only by ``observe``, which is not an rmw.
+The last five are known from their sources. The others were recorded and tried on real ROS 2 jazzy: a ``ros2`` command
+is a node ``/_ros2cli_<pid>`` that publishes ``/rosout`` and ``/parameter_events`` and serves ``get_type_description``
+below its own name (the pid is in it, so a wildcard stands there); ``service call`` and ``action send_goal`` make a node
+named after the interface's type, which serves parameters, too; ``param``, even ``get``, is a client of all six
+parameter services of its target. ``ros_discovery_info`` is granted to all, and must not be published only by
+``observe``, which is not an rmw.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class ToolTarget(Enum):
 class Tool(NamedTuple):
     """A ROS tool and its permissions. ``node``: the name of the tool's own node, empty where it is none. ``own``: what
     it needs whatever its target, ``each``: for each target, which stands for ``{}``. ``example``: a command line
-    that works with it."""
+    that works with it, of the first or of all targets."""
 
     name: str
     what: str
@@ -100,6 +101,18 @@ _TF_LISTENER: tuple[Need, ...] = (
     (_R, "/transform_listener_impl_*/get_type_description"),
 )
 _RVIZ: tuple[Need, ...] = (*_RCLCPP_NODE, *_TF_LISTENER, (_R, "~/reset_time"))
+_ROSBRIDGE: tuple[Need, ...] = (*_RCLPY_NODE, (_P, "/client_count"), (_P, "/connected_clients"))
+
+
+_FOXGLOVE_MANAGER = (
+    "/foxglove_bridge_component_manager"  # foxglove_bridge main.cpp, with a node named dummy beside it
+)
+_FOXGLOVE: tuple[Need, ...] = (
+    *_RCLCPP_NODE,
+    *((operation, name.replace("~", "/dummy", 1)) for operation, name in _RCLCPP_NODE),
+    (_R, f"{_FOXGLOVE_MANAGER}/get_type_description"),
+    *((_R, f"{_FOXGLOVE_MANAGER}/{name}") for name in _CONTAINER_SERVICES),
+)
 
 
 def _below(operation: Operation, names: tuple[str, ...]) -> tuple[Need, ...]:
@@ -128,13 +141,24 @@ TABLE: tuple[Tool, ...] = (
     Tool("component", "ros2 component list, load, unload", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, _CONTAINER_SERVICES), "ros2 component list --no-daemon {target}"),
     Tool("record", "ros2 bag record", ToolTarget.TOPIC, "/rosbag2_recorder", _RECORDER, ((_S, "{}"),),
-         "ros2 bag record {target}"),
+         "ros2 bag record {targets}"),
     Tool("play", "ros2 bag play: it moves the robot as the topics do", ToolTarget.TOPIC, "/rosbag2_player", _PLAYER,
-         ((_P, "{}"),), "ros2 bag play BAG --topics {target}"),
+         ((_P, "{}"),), "ros2 bag play BAG --topics {targets}"),
     Tool("rviz", "rviz2 that shows topics, without tools that publish", ToolTarget.TOPIC, "/rviz", _RVIZ, ((_S, "{}"),),
          "rviz2 -d CONFIG", True),
     Tool("rviz-control", "rviz2 with its tools for goals, poses and points: it can move the robot", ToolTarget.TOPIC,
          "/rviz", (*_RVIZ, *((_P, name) for name in _RVIZ_TOOLS)), ((_S, "{}"),), "rviz2 -d CONFIG", True),
+    Tool("rqt-graph", "rqt_graph", ToolTarget.NOTHING, "/rqt_gui_py_node_*", _RCLPY_NODE, (),
+         "ros2 run rqt_graph rqt_graph"),
+    Tool("teleop", "teleop_twist_keyboard: it moves the robot", ToolTarget.TOPIC, "/teleop_twist_keyboard", _RCLPY_NODE,
+         ((_P, "{}"),), "ros2 run teleop_twist_keyboard teleop_twist_keyboard --ros-args -r cmd_vel:={target}"),
+    Tool("plotjuggler", "PlotJuggler that shows topics", ToolTarget.TOPIC, "/plotjuggler", _RCLCPP_NODE, ((_S, "{}"),),
+         "ros2 run plotjuggler plotjuggler"),
+    Tool("foxglove", "foxglove_bridge that shows topics; who reaches its port sees them", ToolTarget.TOPIC,
+         "/foxglove_bridge", _FOXGLOVE, ((_S, "{}"),),
+         "ros2 run foxglove_bridge foxglove_bridge --ros-args -p 'capabilities:=[connectionGraph]'"),
+    Tool("rosbridge", "rosbridge_websocket that shows topics; who reaches its port sees them", ToolTarget.TOPIC,
+         "/rosbridge_websocket", _ROSBRIDGE, ((_S, "{}"),), "ros2 run rosbridge_server rosbridge_websocket"),
 )  # fmt: skip
 TOOLS = {tool.name: tool for tool in TABLE}
 
@@ -165,6 +189,11 @@ def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
             )
         full_name(target, Profile("/", "tool", ()))
     return targets
+
+
+def takes_planned_topics(tool: Tool) -> bool:
+    """Return whether a tool can be given all topics of a plan: it only reads them."""
+    return tool.target is ToolTarget.TOPIC and tool.each == ((_S, "{}"),)
 
 
 def tool_policy(tool: Tool, targets: tuple[str, ...], enclave: str) -> EnclavePolicy:

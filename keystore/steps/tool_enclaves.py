@@ -76,7 +76,10 @@ def create_tool_enclave(
     root = resolve_root(keystore)
     report = report._replace(warnings=(*report.warnings, *_unknown_targets(root, chosen)))
     example = kind.example.format(
-        keystore=shlex.quote(str(root)), enclave=enclave, target=chosen[0] if chosen else kind.target.value
+        keystore=shlex.quote(str(root)),
+        enclave=enclave,
+        target=chosen[0] if chosen else kind.target.value,
+        targets=" ".join(chosen),
     )
     environment = tool_environment(root, enclave)
     words = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())

@@ -73,6 +73,12 @@ RVIZ = node(
     "rviz", *PARAMETER_SERVICES, "reset_time",
     publishes=(*EVENTS, *LISTENER[0]), subscribes=(*EVENTS, *LISTENER[1], "rt/tf", "rt/tf_static"),
 )  # fmt: skip
+RQT = node("rqt_gui_py_node_4711", *PARAMETER_SERVICES, publishes=EVENTS)
+TELEOP = node("teleop_twist_keyboard", *PARAMETER_SERVICES, publishes=EVENTS)
+PLOTJUGGLER = node("plotjuggler", *PARAMETER_SERVICES, publishes=EVENTS, subscribes=EVENTS)
+ROSBRIDGE = node(
+    "rosbridge_websocket", *PARAMETER_SERVICES, publishes=(*EVENTS, "rt/client_count", "rt/connected_clients")
+)
 RVIZ_TOOLS = ("rt/goal_pose", "rt/initialpose", "rt/clicked_point")
 FOLD = "/fold/_action"
 FOLDING = Has(
@@ -113,6 +119,10 @@ CASES: dict[str, tuple[tuple[str, ...], Has, Has, Has]] = {
     ),
     "rviz": (("/scan",), RVIZ, Has((), ("rt/scan",)), Has((*RVIZ_TOOLS, "rt/scan", "rt/tf"), ("rt/map",))),
     "rviz-control": (("/scan",), RVIZ, Has(RVIZ_TOOLS, ("rt/scan",)), Has(("rt/cmd_vel",), ("rt/map",))),
+    "rqt-graph": ((), RQT, Has((), ()), Has(("rt/chatter",), ("rt/chatter",))),
+    "teleop": (("/cmd_vel",), TELEOP, Has(("rt/cmd_vel",), ()), Has(("rt/other",), ("rt/cmd_vel",))),
+    "plotjuggler": (("/scan",), PLOTJUGGLER, Has((), ("rt/scan",)), Has(("rt/scan",), ("rt/map",))),
+    "rosbridge": (("/scan",), ROSBRIDGE, Has((), ("rt/scan",)), Has(("rt/scan",), ("rt/map",))),
     "play": (("/chatter",), PLAYER, Has(("rt/chatter",), ()), Has(("rt/other", "rt/clock"), ("rt/chatter",))),
 }  # fmt: skip
 

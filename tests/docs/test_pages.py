@@ -28,6 +28,7 @@ WITH_NODES = ("asyncio", "learn-from-a-run", "observe-a-running-system", "sros2-
 """Their commands start nodes, or look at nodes that run: each has its test below."""
 ELSEWHERE = {
     "docker compose -f compose/compose.yaml up": "addons/deployment/test_podman.py",
+    "faketime '1970-01-01 00:10:00' secure-keystore ": "keystore/test_time.py",
     "kubectl apply -f k8s/": "addons/deployment/test_podman.py",
     "echo 'pkcs11:": "keystore/test_pkcs11.py",
     "ros2 launch ": "addons/ros2/test_ros2_launch.py",

@@ -16,6 +16,7 @@ from keystore.formats.tool_needs import TABLE, TOOLS, ToolTarget, tool_policy, t
 from keystore.verb import main
 from tests.keystore.kit import options, policy
 
+DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 DOCS = Path(__file__).parents[2] / "docs" / "running-systems.md"
 
 
@@ -96,6 +97,47 @@ def test_no_tool_gets_more_than_its_own_names_its_target_and_what_every_node_has
                 or rule.expression.startswith("/robot/it")
                 or (rule.operation, rule.expression) in kind.own
             )
+
+
+def test_a_recorder_gets_exactly_the_topics_that_a_launch_publishes(
+    root: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(DEMO))
+    plan = ["--plan", "demo_nodes", "talker_listener.launch.xml"]
+    assert main(["tool-enclave", str(root), "--for", "record", *plan, "--format", "json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    subscribed = {each.split()[1] for each in made["permissions"] if each.startswith("subscribe ")}
+    assert "/chatter" in subscribed and not any("*" in name for name in subscribed)
+    assert made["command"].rpartition("ros2 bag record ")[2].split() == sorted(subscribed), "to be copied"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["record", "--all"], "--plan PACKAGE LAUNCH_FILE"),
+        (["record", "-a"], "--plan PACKAGE LAUNCH_FILE"),
+        (
+            ["pub", "--plan", "demo_nodes", "talker_listener.launch.xml"],
+            "--plan is for tools that read topics",
+        ),
+        (["record", "--plan", "no_such_package", "x.launch.xml"], "--plan no_such_package x.launch.xml: "),
+    ],
+)
+def test_what_no_tool_is_given(
+    root: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    told: str,
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(DEMO))
+    assert main(["tool-enclave", str(root), "--for", *words]) == 2
+    assert told in capsys.readouterr().err and list_enclaves(root) == []
+
+
+def test_a_command_names_all_its_targets(root: Path) -> None:
+    assert create_tool_enclave(root, "record", ["/a", "/b"]).command.endswith("ros2 bag record /a /b")
+    assert create_tool_enclave(root, "play", ["/a", "/b"]).command.endswith("--topics /a /b")
 
 
 def test_the_documentation_shows_the_table() -> None:
