@@ -15,27 +15,34 @@ Reads the disk, each document once per ``ManifestLookup``.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.words import some_of
-from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
+from nodl.ament_index import (
+    INDEX_FOLDER,
+    PackageNotFoundError,
+    executables,
+    list_resources,
+    package_share_directory,
+)
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, read_document, resource_key
-from nodl.errors import ConflictingNoDLError, NoManifestError
+from nodl.errors import ConflictingNoDLError, IncludeError, NoManifestError
 from nodl.node_interface import ManifestNode, NodeInterface
 
 
 class Lookup(NamedTuple):
     """The answer of a lookup. ``found`` is empty when no document describes the executable; ``searched`` says where we
     looked. ``named``: the user named the document; ``described``: the programs of the documents that were named in
-    vain."""
+    vain; ``registered``: names under which the package registers documents, of which none is a program of it."""
 
     found: tuple[NodeInterface, ...]
     searched: tuple[str, ...]
     named: bool = False
     described: tuple[str, ...] = ()
+    registered: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.found)
@@ -68,11 +75,17 @@ class ManifestLookup:
         fits = partial(_describes, executable=executable, plugin=plugin)
         installed = self._package(package)
         found = [node for node in installed.nodes if fits(node)]
-        return Lookup(_agreed(f"{package}/{executable or plugin}", found), installed.searched)
+        unresolved = installed.unresolved.get(executable or (plugin or "").rpartition("::")[2])
+        if unresolved is not None and not found:
+            raise unresolved
+        agreed = _agreed(f"{package}/{executable or plugin}", found)
+        return Lookup(agreed, installed.searched, registered=() if found else installed.no_programs())
 
     def all_of(self, package: str) -> Lookup:
         """Return every node that the documents of ``package`` describe, conflicts included."""
         installed = self._package(package)
+        for error in installed.unresolved.values():
+            raise error
         return Lookup(tuple(node.interface for node in installed.nodes), installed.searched)
 
     def _chosen_nodes(self) -> tuple[ManifestNode, ...]:
@@ -104,13 +117,24 @@ _NAMED = 3  # prefixes in a message: an isolated workspace has one for each pack
 
 
 class _Package(NamedTuple):
+    """The documents of a package. ``unresolved``: those that include something absent, by the name they have in the
+    index. They are an error of that program alone."""
+
     nodes: tuple[ManifestNode, ...]
     searched: tuple[str, ...]
+    unresolved: Mapping[str, IncludeError]
+    programs: frozenset[str]
+
+    def no_programs(self) -> tuple[str, ...]:
+        """Return the programs that documents name and the package does not have."""
+        named = (node.interface.executable for node in self.nodes)
+        return tuple(sorted({name for name in named if name and name not in self.programs}))
 
 
 def _read_package(package: str, prefixes: Sequence[str]) -> _Package:
     nodes: list[ManifestNode] = []
     searched: list[str] = []
+    unresolved: dict[str, IncludeError] = {}
     try:
         share = package_share_directory(package, prefixes)
     except (PackageNotFoundError, ValueError):
@@ -125,8 +149,13 @@ def _read_package(package: str, prefixes: Sequence[str]) -> _Package:
     for key, prefix in sorted(list_resources(RESOURCE_TYPE, prefixes).items()):
         if key.startswith(start):
             path = os.path.join(prefix, INDEX_FOLDER, RESOURCE_TYPE, key)
-            nodes.extend(read_document(path, package=package, name=key[len(start) :], prefixes=prefixes))
-    return _Package(tuple(nodes), tuple(searched))
+            name = key[len(start) :]
+            try:
+                nodes.extend(read_document(path, package=package, name=name, prefixes=prefixes))
+            except IncludeError as error:
+                unresolved[name] = error
+    programs = (each for prefix in prefixes for each in executables(os.path.join(prefix, "lib", package)))
+    return _Package(tuple(nodes), tuple(searched), unresolved, frozenset(programs))
 
 
 def _v1_files(share: str) -> list[str]:

@@ -163,6 +163,9 @@ class InterfaceFinder:
         if self._options.library:
             searched.append("the library has no document of it")
         searched += [f"--nodl describes {', '.join(named.described)}"] if named.described else []
+        if named.registered:
+            names = ", ".join(named.registered)
+            searched.append(f"the manifests of the package are of {names}, which is no program of it")
         searched.append("looked for a manifest at " + _shortly(named.searched))
         return _Known((*found,), (*searched,), analysed is not None and analysed.of_this_start)
 

@@ -159,10 +159,27 @@ def _nodes(plan: LaunchPlan) -> list[dict[str, object]]:
             "enclave": enclave,
             "program": _program(interfaces[enclave, fqn]),
             "parameters": _declared(interfaces[enclave, fqn]),
-            "interfaces": uses,
+            "interfaces": _once(uses),
         }
         for (enclave, fqn), uses in sorted(found.items(), key=lambda item: (item[0][1], item[0][0]))
     ]
+
+
+def _once(uses: list[dict[str, object]]) -> list[dict[str, object]]:
+    """Leave out of several entries for one name those that say no more: no type, or a type that another one has."""
+    found: dict[tuple[object, object], list[dict[str, object]]] = {}
+    for use in uses:
+        same = found.setdefault((use["operation"], use["name"]), [])
+        types = [each["type"] for each in same]
+        if not use["type"] and same:
+            continue
+        if use["built_in"] and use["type"] in types:
+            continue
+        same[:] = [
+            each for each in same if each["type"] and not (each["built_in"] and each["type"] == use["type"])
+        ]
+        same.append(use)
+    return [use for same in found.values() for use in same]
 
 
 def _program(interface: NodeInterface) -> str:

@@ -45,6 +45,8 @@ def integer(minimum: int, maximum: int | None = None) -> Checker:
 
     def check(value: YamlValue, what: str) -> None:
         number = value.value if isinstance(value, YamlScalar) else None
+        if isinstance(number, float) and number.is_integer():  # JSON Schema takes 1.0 for an integer
+            number = int(number)
         if isinstance(number, bool) or not isinstance(number, int):
             fail(value, f"{what} must be an integer")
         elif number < minimum or (maximum is not None and number > maximum):

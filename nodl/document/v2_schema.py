@@ -52,7 +52,7 @@ _REFERENCE = map_of(
     required=("ref",),
 )
 NAME_PATTERN = r"^[A-Za-z]$|^[/~A-Za-z][A-Za-z0-9_/]*[A-Za-z0-9_]$"
-TYPE_PATTERN = r"^[a-zA-Z][a-zA-Z0-9_]*(/(msg|srv|action))?/[A-Z][a-zA-Z0-9]*$"
+TYPE_PATTERN = r"^[a-zA-Z][a-zA-Z0-9_]*(/(msg|srv|action))?/[A-Z][a-zA-Z0-9]*$(?!\n)"
 _NAME = text_of(
     NAME_PATTERN,
     "a ROS name (letters, digits, '_' and '/', starting with '/', '~' or a letter; no wildcards)",

@@ -233,3 +233,41 @@ def test_the_overlay_wins(prefix: Prefix, tmp_path: Path) -> None:
     prefixes = [str(overlay.root), str(prefix.root)]
     for executable in ("talker", "other"):
         assert topics(ManifestLookup(prefixes).find("demo", executable=executable)) == ["over"]
+
+
+def test_a_document_that_does_not_resolve_refuses_its_own_program_alone(prefix: Prefix) -> None:
+    prefix.v2("pk", "good", "/a")
+    prefix.v2("pk", "bad", "/b").write_text("nodl_version: 2\ninclude: [{ref: 'nodl://nowhere/at_all'}]\n")
+    assert find(prefix, "pk", "good").found
+    assert not find(prefix, "pk", "other").found
+    with pytest.raises(errors.IncludeError, match="nowhere/at_all"):
+        find(prefix, "pk", "bad")
+    with pytest.raises(errors.IncludeError, match="nowhere/at_all"):
+        ManifestLookup([str(prefix.root)]).all_of("pk")
+
+
+def test_a_document_under_a_name_that_is_no_program_is_named(prefix: Prefix) -> None:
+    prefix.v2("pk", "laser", "/a")
+    prefix.v2("pk", "camera", "/a")
+    program = prefix.root / "lib" / "pk" / "camera"
+    program.parent.mkdir(parents=True, exist_ok=True)
+    program.touch(0o755)
+    assert find(prefix, "pk", "laser_nodl").registered == ("laser",)
+    assert find(prefix, "pk", "camera").registered == ()
+
+
+@pytest.mark.parametrize(
+    ("document", "name"),
+    [
+        ("nodl_common_interfaces/node", "/rosout"),
+        ("nodl_common_interfaces/lifecycle_node", "~/change_state"),
+        ("rclcpp/node", "/parameter_events"),
+        ("rclpy/node", "~/set_parameters"),
+        ("rclpy/lifecycle_node", "~/transition_event"),
+        ("rclcpp_lifecycle/lifecycle_node", "~/get_state"),
+    ],
+)
+def test_documents_that_ros_brings_are_known_without_it(prefix: Prefix, document: str, name: str) -> None:
+    prefix.v2("pk", "e", "/a").write_text(f"nodl_version: 2\ninclude: [{{ref: 'nodl://{document}'}}]\n")
+    (interface,) = find(prefix, "pk", "e").found
+    assert name in [str(endpoint.name) for endpoint in interface.endpoints]

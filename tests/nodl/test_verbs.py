@@ -56,6 +56,49 @@ def test_validating_a_folder_tells_every_broken_file(
     assert captured.err.splitlines()[1].startswith("bad.nodl.yaml:2: the document has no key 'x'")
 
 
+TOPIC = """nodl_version: 2
+publishers: [{{name: {}, type: {}, qos: {{history: KEEP_LAST, depth: {}, reliability: RELIABLE}}}}]
+"""
+
+
+@pytest.mark.parametrize("name", ["a//b", "a/1b", "~x"])
+def test_a_name_that_the_schema_takes_and_ros_does_not_is_valid_with_a_warning(
+    folder: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    (folder / "x.nodl.yaml").write_text(TOPIC.format(f"'{name}'", "std_msgs/msg/String", 1))
+    assert main(["validate", "x.nodl.yaml"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == "x.nodl.yaml: fits the schema of NoDL v2\n"
+    assert "x.nodl.yaml:2" in printed.err and "ROS refuses it" in printed.err
+
+
+@pytest.mark.parametrize(
+    ("name", "type_name", "depth", "status"),
+    [
+        ("a", "std_msgs/msg/String", "1.0", 0),
+        ("a", "std_msgs/msg/String", "1.5", 1),
+        ("a", '"std_msgs/msg/String\\n"', "1", 1),
+        ("a-b", "std_msgs/msg/String", "1", 1),
+    ],
+)
+def test_numbers_and_types_are_taken_as_by_the_schema(
+    folder: Path, name: str, type_name: str, depth: str, status: int
+) -> None:
+    (folder / "x.nodl.yaml").write_text(TOPIC.format(name, type_name, depth))
+    assert main(["validate", "x.nodl.yaml"]) == status
+
+
+def test_includes_are_resolved_unless_they_shall_not_be(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "x.nodl.yaml").write_text("nodl_version: 2\ninclude: [{ref: 'nodl://nowhere/at_all'}]\n")
+    assert main(["validate", "x.nodl.yaml"]) == 1
+    assert "nowhere/at_all" in capsys.readouterr().err
+    assert main(["validate", "--no-resolve", "x.nodl.yaml", "demo.nodl.xml"]) == 0
+    (folder / "x.nodl.yaml").write_text("nodl_version: 2\nbase: x\n")
+    assert main(["validate", "--no-resolve", "x.nodl.yaml"]) == 1
+
+
 def test_validating_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["validate"]) == 2
