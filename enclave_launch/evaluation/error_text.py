@@ -19,6 +19,7 @@ from enclave_launch.description.launch_context import WatchedConfigurations
 from enclave_launch.description.markup.expose import action_parse_methods, substitution_parse_methods
 from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
 from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.evaluation.usual_causes import usual_cause, without_addresses
 from enclave_launch.evaluation.words_elsewhere import word_elsewhere
 from enclave_launch.frontend.error_location import frames
 from enclave_launch.host.current import current_release
@@ -42,8 +43,8 @@ _PLACE = re.compile(r": line \d+(, column \d+)?$")  # at the end of what XML par
 def error_text(error: BaseException) -> str:
     """Return one message: what is wrong and, if something can be done about it, what."""
     error = getattr(error, "orig_exc", error)  # of a template: the complaint of the substitution in it
-    text = _PLACE.sub("", _TYPE.sub(r"\1", _text(error).strip()))
-    return text + _next_step(error, text) if text else type(error).__name__
+    text = without_addresses(_PLACE.sub("", _TYPE.sub(r"\1", _text(error).strip())))
+    return text + (usual_cause(error, text) or _next_step(error, text)) if text else type(error).__name__
 
 
 def _text(error: BaseException) -> str:
@@ -119,6 +120,4 @@ def _next_step(error: BaseException, text: str) -> str:
             f"Python {sys.version_info.major}.{sys.version_info.minor}, PYTHONPATH and the install prefixes"
         )
         return f" (searched: {folders})"
-    if isinstance(error, AttributeError) and "get_launch_arguments_with_include" in text:
-        return "\ngenerate_launch_description() must return a LaunchDescription"
     return ""

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
+import enclave_common
 import enclave_launch
 import keystore
 import nodl
@@ -182,7 +183,7 @@ def _location(error: BaseException, path: str) -> tuple[SourceLocation, SourceLo
 
 def _user_frame(error: BaseException) -> SourceLocation | None:
     """Return the innermost frame of the user's own code, neither ours nor of the standard library."""
-    packages = (enclave_launch.__file__, nodl.__file__, keystore.__file__)
+    packages = (enclave_launch.__file__, nodl.__file__, keystore.__file__, enclave_common.__file__)
     ours = tuple(os.path.dirname(os.path.abspath(file)) + os.sep for file in packages if file)
     library = sysconfig.get_paths()["stdlib"]
     found = None

@@ -209,3 +209,71 @@ def test_a_command_that_misses_a_package_itself_gives_a_placeholder_when_package
 def test_a_command_that_fails_otherwise_is_an_error_when_packages_may_be_missing(tmp_path: Path) -> None:
     text = XML.format("<executable cmd=\"talker $(command 'cat /no/such/arm.urdf')\"/>")
     assert "executed command failed" in message(tmp_path, "a.launch.xml", text, allow_missing_packages=True)
+
+
+@pytest.mark.parametrize(
+    ("expression", "cause"),
+    [
+        ("true and $(var a)", "Python writes True; compare the text of an argument instead"),
+        ("$(var a) == 'front'", "if front is the value of an argument, put it in quotes"),
+        ("$(var a) +", "a text needs quotes around it"),
+        ("len(3)", ""),
+    ],
+)
+def test_an_error_in_an_expression_names_the_expression_and_its_usual_cause(
+    tmp_path: Path, expression: str, cause: str
+) -> None:
+    text = (
+        '<launch><arg name="a" default="front"/>\n<let name="b" value="$(eval &quot;'
+        + expression
+        + '&quot;)"/></launch>'
+    )
+    told = message(tmp_path, "a.launch.xml", text)
+    assert told.startswith("a.launch.xml:2: <let> ")
+    assert f"\nin the expression: {expression.replace('$(var a)', 'front')}" in told
+    assert cause in told
+    assert bool(cause) == (told.count("\n") == 2)
+
+
+PYTHON = """from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+import os
+def generate_launch_description():
+    node = Node(package="pk", executable="e")
+    return {}
+"""
+
+
+@pytest.mark.parametrize(
+    ("returned", "cause"),
+    [
+        ("LaunchDescription([Node(package='p', executable='a' + LaunchConfiguration('x'))])",
+         "a LaunchConfiguration has no value before the launch file is visited"),
+        ("LaunchDescription([os.path.join('a', LaunchConfiguration('x'))])",
+         "a LaunchConfiguration has no value before the launch file is visited"),
+        ("LaunchDescription([None])", "a NoneType stands where an action is expected"),
+        ("[node]", "generate_launch_description() must return a LaunchDescription"),
+        ("LaunchDescription([Node(package='p', executable='e', parameters=[{'a': object()}])])",
+         "Unexpected type for parameter value <object>"),
+        ("LaunchDescription([DeclareLaunchArgument('x', default_value='1', condition=LaunchConfiguration('x'))])",
+         "condition= takes a condition, such as IfCondition(...), not a LaunchConfiguration"),
+    ],
+)  # fmt: skip
+def test_an_error_of_python_has_its_usual_cause_and_no_address(
+    tmp_path: Path, returned: str, cause: str
+) -> None:
+    told = message(tmp_path, "a.launch.py", PYTHON.format(returned))
+    assert cause in told
+    assert "0x" not in told
+
+
+def test_an_error_in_a_parameter_file_with_substitutions_is_at_its_line(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("/**:\n  ros__parameters:\n    a: $(var known)\n    b: $(var gone)\n")
+    text = (
+        '<launch><arg name="known" default="1"/>\n<node pkg="pk" exec="e">'
+        f'<param from="{tmp_path}/p.yaml" allow_substs="true"/></node></launch>'
+    )
+    told = message(tmp_path, "a.launch.xml", text, allow_missing_packages=True)
+    assert told.startswith("p.yaml:4: launch configuration 'gone' does not exist")

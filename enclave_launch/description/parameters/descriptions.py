@@ -17,11 +17,14 @@ from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
     SomeSubstitutionsType_types_tuple,
     SubstitutionFailure,
+    TextSubstitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
+from enclave_launch.frontend import error_location
 from enclave_launch.ros_rules.parameter_file import MAX_BYTES
+from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
@@ -150,8 +153,7 @@ class ParameterFile:
 def _substituted(context: LaunchContext, path: Path) -> Path:
     if context.host.allow_missing_packages and not context.host.has_parameter_file(str(path)):
         return path  # reported where it is used
-    template = parse_substitution(context.host.read_parameter_file(str(path)))
-    text = perform_substitutions(context, template, MAX_BYTES)
+    text = _performed_file(context, path)
     try:
         yaml_text.load_parameter_file(text)
     except yaml.YAMLError:
@@ -159,3 +161,20 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
     written = context.host.write_parameter_file(text)
     context.host.parameter_file_sources[written] = str(path)
     return Path(written)
+
+
+def _performed_file(context: LaunchContext, path: Path) -> str:
+    """Perform the substitutions in a file; an error is at the line of the one that raised it."""
+    pieces: list[str] = []
+    line = 1
+    for part in parse_substitution(context.host.read_parameter_file(str(path))):
+        try:
+            pieces.append(part.perform(context))
+        except Exception as error:  # any error of a substitution; it goes on, with its place noted
+            error_location.mark_at(error, SourceLocation(str(path), line))
+            raise
+        line += part.text.count("\n") if isinstance(part, TextSubstitution) else 0
+    text = "".join(pieces)
+    if len(text) > MAX_BYTES:
+        raise SubstitutionFailure(f"substitutions give a text of more than {MAX_BYTES} characters")
+    return text

@@ -124,9 +124,22 @@ class PythonExpression(Substitution):
         # A launch file may compute anything here: that is the substitution's purpose.
         expression = perform_substitutions(context, self.__expression)
         results = context.host.user_code_results
-        if results is None or context.on_event is not None:
-            return str(eval(expression, {}, names))
-        return results.call(("eval", expression), lambda: str(eval(expression, {}, names)))
+        try:
+            if results is None or context.on_event is not None:
+                return str(eval(expression, {}, names))
+            return results.call(("eval", expression), lambda: str(eval(expression, {}, names)))
+        except Exception as error:  # whatever the expression raises; it goes on, with the expression noted
+            setattr(error, _EXPRESSION, expression)
+            raise
+
+
+_EXPRESSION = "enclave_launch_expression"
+
+
+def expression_of(error: BaseException) -> str | None:
+    """Return the Python expression, as it was evaluated, that raised ``error``; None for any other error."""
+    expression: str | None = getattr(error, _EXPRESSION, None)
+    return expression
 
 
 def _literal_names(modules: Any) -> list[str]:
