@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shlex
 import shutil
 import sys
 import textwrap
@@ -19,7 +20,7 @@ from enclave_common import VERSION
 from enclave_common.add_ons import add_ons
 from enclave_common.dependencies import missing_dependency
 from enclave_common.terminal import OutputError, choose_colour, quoted
-from enclave_common.words import counted, did_you_mean
+from enclave_common.words import counted, nearest
 
 _INVALID_CHOICE = re.compile(r".*invalid choice: '([^']*)' \(choose from (.*)\)$", re.DOTALL)
 
@@ -141,6 +142,7 @@ class CommandParser(argparse.ArgumentParser):
         self.arguments: list[argparse.Action] = []
         self.verbs: dict[str, CommandParser] = {}
         self.verb_dest = ""
+        self.words: list[str] = []
         self._daily: frozenset[str] | None = None
         self._left_out: Counter[str] = Counter()
         texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
@@ -276,16 +278,24 @@ class CommandParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and exit with status 2, as argparse."""
         self.usage = self.usage or self._one_usage()
-        super().error(message + self._suggestion(message))
+        wrong, known = self._mistyped(message)
+        meant = nearest(wrong, known) if wrong else None
+        if choice := _INVALID_CHOICE.match(message):  # Python's own words differ from version to version
+            message = f"{message.partition(': ')[0]}: {quoted(choice[1])} is not one of {', '.join(known)}"
+        question = f"; did you mean {meant!r}?" if meant else ""
+        corrected = shlex.join(_replaced(self.words, wrong, meant)) if meant else "--help"
+        super().error(f"{message}{question}\ntry: {self.prog} {corrected}")
 
-    def _suggestion(self, message: str) -> str:
+    def _mistyped(self, message: str) -> tuple[str, list[str]]:
+        """Return the word that is not known, and those that are known in its place."""
         if message.startswith("unrecognized arguments: "):
             options = [word.partition("=")[0] for word in message.split()[2:] if word.startswith("-")]
-            known = [flag for action in self._actions for flag in action.option_strings]
-            return did_you_mean(options[0], known) if options else ""
+            return options[0] if options else "", [
+                flag for each in self._actions for flag in each.option_strings
+            ]
         if choice := _INVALID_CHOICE.match(message):
-            return did_you_mean(choice[1], re.findall(r"[^\s',]+", choice[2]))
-        return ""
+            return choice[1], re.findall(r"[^\s',]+", choice[2])
+        return "", []
 
 
 class _HelpAll(argparse.Action):
@@ -294,6 +304,18 @@ class _HelpAll(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
         self.const().print_help()
         parser.exit()
+
+
+def _replaced(words: Iterable[str], wrong: str, meant: str) -> list[str]:
+    """Return ``words`` with the mistyped one corrected, also in ``--option=value``."""
+    return [
+        meant
+        if word == wrong
+        else f"{meant}={word.partition('=')[2]}"
+        if word.startswith(f"{wrong}=")
+        else word
+        for word in words
+    ]
 
 
 def _in_usage(action: argparse.Action) -> str:
@@ -410,11 +432,13 @@ class CommandLine:
         options: Every option with its value.
         given: The names of the options that were written.
         actions: The options of the command or verb.
+        words: The command line behind the name of the command.
     """
 
     options: argparse.Namespace
     given: frozenset[str]
     actions: tuple[argparse.Action, ...] = ()
+    words: tuple[str, ...] = ()
 
 
 def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> CommandLine:
@@ -428,12 +452,15 @@ def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> Comm
         Every option, and the names of those that were written.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    everything = tuple(words)
     chosen = {}
+    parser.words = words
     while parser.verb_dest:
         if not words or words[0] not in parser.verbs:
             return CommandLine(parser.parse_args(words), frozenset())  # or ends: help, a version, an error
         chosen[parser.verb_dest] = words[0]
         parser, words = parser.verbs[words[0]], words[1:]
+        parser.words = words
     defaults = {action.dest: _default(action) for action in parser.arguments}
     for action in parser.arguments:
         if action.nargs != "?":  # argparse would convert the mark as a value
@@ -443,7 +470,9 @@ def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> Comm
     written = frozenset(name for name, value in given.items() if name in defaults and value is not None)
     plain = given.get("format", known.get("format")) in _MACHINE_FORMATS
     choose_colour("never" if plain else given.get("color", "auto"))
-    return CommandLine(argparse.Namespace(**{**chosen, **known, **given}), written, tuple(parser.arguments))
+    return CommandLine(
+        argparse.Namespace(**{**chosen, **known, **given}), written, tuple(parser.arguments), everything
+    )
 
 
 def _default(action: argparse.Action) -> Any:

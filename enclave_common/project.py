@@ -95,7 +95,8 @@ def with_project(
 ) -> argparse.Namespace:
     """Return the options of a command line with what the environment and the project say where an option is absent.
 
-    The namespace also gets ``project`` and ``given``, the names of the options that were written.
+    The namespace also gets ``project``, ``given`` (the names of the options that were written), and ``typed`` (the
+    words of the command line).
 
     Raises:
         ProjectError: A value that the option does not take.
@@ -108,7 +109,7 @@ def with_project(
         values = _values(configured, action, project, environment)
         if values:
             found[action.dest] = values if isinstance(found.get(action.dest), list) else values[0]
-    return argparse.Namespace(**{**found, "project": project, "given": line.given})
+    return argparse.Namespace(**{**found, "project": project, "given": line.given, "typed": line.words})
 
 
 def _values(

@@ -22,7 +22,13 @@ _ALIKE = 0.6  # of difflib's ratio: what Python's own "Did you mean" and git tak
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'talker'?"`` for a mistyped word, or an empty text.
+    """Return ``"; did you mean 'talker'?"`` for a mistyped word, or an empty text."""
+    meant = nearest(word, known)
+    return f"; did you mean {meant!r}?" if meant else ""
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that was probably meant, None if none is alike.
 
     A word that continues ``word`` comes first: ``--form`` is the beginning of ``--format`` rather than a slip for
     ``--for``."""
@@ -30,4 +36,4 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     begun = [each for each in by_letters if each.startswith(word.lower())]
     close = difflib.get_close_matches(word.lower(), begun, n=1, cutoff=_ALIKE)
     close = close or difflib.get_close_matches(word.lower(), by_letters, n=1, cutoff=_ALIKE)
-    return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
+    return by_letters[close[0]] if close else None

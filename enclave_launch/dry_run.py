@@ -207,6 +207,10 @@ class DryRun(_Strict, frozen=True):
     release: Optional[Release] = Field(
         None, description="absent in documents of older versions of this program"
     )
+    refused: Optional[bool] = Field(
+        None,
+        description="a secured start would be refused; the dry run itself ends with 0, with --strict with 1",
+    )
     processes: list[Process]
     components: list[Component]
     enclaves: dict[str, Enclave]

@@ -93,7 +93,9 @@ class StorageError(KeystoreError):
         """Return the error of the keystore for ``error``; ``doing`` is a phrase such as ``writing the keystore``."""
         place = f" {printable(str(error.filename))}" if error.filename else ""
         reason = error.strerror or error
-        return cls(f"{doing}{place}: {reason}; no file was left half-written: fix this and run it again")
+        only_read = doing.split()[0] in ("reading", "looking", "checking", "asking")
+        after = "" if only_read else "; no file was left half-written: fix this and run it again"
+        return cls(f"{doing}{place}: {reason}{after}")
 
 
 @contextmanager

@@ -26,6 +26,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
     return {
         "version": VERSION,
         "release": _release(plan.evaluation),
+        "refused": bool(plan.problems),
         "processes": [_process(item, security) for item in plan.processes],
         "components": [_component(item) for item in plan.components],
         "enclaves": _enclaves(plan),

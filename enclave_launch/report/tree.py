@@ -39,6 +39,9 @@ def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
         lines += ["without an enclave", *_draw(outside, style)]
     lines += style.listed("error under --secure", plan.problems)
     lines += style.listed("warning", plan.warnings)
+    if plan.problems:
+        text = f"a secured start would be refused: {counted(len(plan.problems), 'error')}. "
+        lines += style.wrapped(f"{text}A dry run ends with status 0, with --strict with 1.", "", "    ")
     return "\n".join(lines) + "\n"
 
 

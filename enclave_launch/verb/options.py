@@ -111,6 +111,7 @@ LOOKING: tuple[Option, ...] = (
     ("--dry-run", FLAG, "print the plan; start nothing, write nothing"),
     ("--format", one_of("tree", "json", "policy"),
      "of the dry run: tree (default), json, or the derived SROS2 policy"),
+    ("--strict", FLAG, "with --dry-run: exit status 1 if a secured start would be refused"),
     ("--explain ENCLAVE|NODE|TOPIC", TEXT,
      "why each permission is there: manifest, remap rule or built-in, with file and line"),
     ("--dump-params", FLAG, "print every node's parameters as one YAML file"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -108,8 +109,10 @@ def _keystore(options: argparse.Namespace) -> str | None:
     if not options.secure:
         return None
     if options.keystore is None:
+        words = shlex.join(word for word in options.typed if word != "--secure")
         raise UsageError(
-            "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE, or keystore in enclaves.yaml"
+            "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE, or write enclaves.yaml\n"
+            f"try: secure-launch --secure --keystore keystore {words}"
         )
     return str(os.path.abspath(options.keystore))
 
@@ -134,13 +137,18 @@ def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | Non
     elif options.format == "policy" or options.dump_params:  # the JSON holds them
         warn(*diagnostics)
     sys.stdout.write(short_paths(text, os.getcwd()) if options.explain else text)
-    return 0
+    return _status(plan, options)
+
+
+def _status(plan: LaunchPlan, options: argparse.Namespace) -> int:
+    """Return 0, and 1 for a plan whose secured start would be refused, if ``--strict`` asks for that."""
+    return 1 if options.strict and plan.problems else 0
 
 
 def _show_tree(plan: LaunchPlan, options: argparse.Namespace) -> int:
     shown = plan._replace(warnings=()) if options.quiet else plan
     sys.stdout.write(plan_tree(shown, terminal_style_of(sys.stdout, verbose=options.verbose)))
-    return 0
+    return _status(plan, options)
 
 
 def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_common.words import did_you_mean
+from enclave_common.words import did_you_mean, some_of
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate
 from nodl import ament_index
@@ -32,7 +32,9 @@ def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
     directory that was removed.
     """
     if not words:
-        raise UsageError("give PACKAGE LAUNCH_FILE or the PATH of a launch file (see secure-launch --help)")
+        raise UsageError(
+            "give PACKAGE LAUNCH_FILE, or the PATH of a launch file\ntry: secure-launch --dry-run PACKAGE LAUNCH_FILE"
+        )
     with translated(OSError, UsageError, "the working directory: "):
         os.getcwd()
     first, *rest = words
@@ -70,10 +72,10 @@ def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:
     try:
         return ament_index.launch_file_path(package, file_name, prefixes)
     except ament_index.PackageNotFoundError as error:
-        searched = "".join(f"\n  {prefix}" for prefix in prefixes) or " no prefix at all"
+        searched = some_of(prefixes, 3) or "no prefix at all"
         raise UsageError(
-            f"package {error.package!r} not found{_meant(error.package, prefixes)}, searched:{searched}\n"
-            "source the workspace (AMENT_PREFIX_PATH) or name its install prefix with --prefix"
+            f"package {error.package!r} not found{_meant(error.package, prefixes)}, searched: {searched}\n"
+            "try: . install/setup.bash in the workspace of the package, or --prefix DIR with its install prefix"
         ) from error
     except ament_index.LaunchFileNotFoundError as error:
         known = ament_index.launch_files(package, prefixes)

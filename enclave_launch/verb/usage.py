@@ -29,6 +29,8 @@ def check_views(line: CommandLine, actions: Sequence[argparse.Action]) -> bool:
     if "format" in line.given and (views or not line.options.dry_run):
         beside = f" beside {_flags(actions, views)}" if views else ""
         raise UsageError(f"--format has no effect{beside}: it is for --dry-run; nothing was started")
+    if "strict" in line.given and not line.options.dry_run:
+        raise UsageError("--strict has no effect without --dry-run; nothing was started")
     if "explain" in line.given and not line.options.explain:  # as of a variable that is not set
         raise UsageError("--explain needs the name of an enclave, node or topic; nothing was started")
     return bool(views) or line.options.dry_run

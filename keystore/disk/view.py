@@ -79,20 +79,30 @@ class KeystoreView:
         """Raise NotAKeystoreError for a directory with other things in it, in which no keystore can be made."""
         if not self.is_complete and not self.can_be_completed:
             raise NotAKeystoreError(
-                f"{printable(self.root)} exists and is not a keystore; choose an empty or new directory"
+                f"{printable(self.root)} is not a keystore, and other files are in it\n"
+                f"try: secure-keystore create {shlex.quote(str(self.root / 'keystore'))}"
             )
 
     def require_complete(self) -> None:
         if not self.root.is_dir():
             raise NotAKeystoreError(
-                f"there is no keystore at {printable(self.root)}; to make one: "
-                f"secure-keystore create {shlex.quote(str(self.root))}"
+                f"there is no keystore at {printable(self.root)}\n"
+                f"try: secure-keystore create {shlex.quote(str(self.root))}"
             )
-        if not self.is_complete:
+        if self.is_complete:
+            return
+        around = next((each for each in self.root.parents if KeystoreView(each).is_complete), None)
+        if around is not None:
             raise NotAKeystoreError(
-                f"{printable(self.root)} is not a complete keystore (public/, enclaves/governance.p7s); "
-                f"to make or complete it: secure-keystore create {shlex.quote(str(self.root))}"
+                f"{printable(self.root)} is a folder inside the keystore {printable(around)}\n"
+                f"try: secure-keystore verify {shlex.quote(str(around))}"
             )
+        if self.can_be_completed:
+            raise NotAKeystoreError(
+                f"{printable(self.root)} is not a complete keystore: it is empty, or its creation was interrupted\n"
+                f"try: secure-keystore create {shlex.quote(str(self.root))}"
+            )
+        self.refuse_foreign()
 
     @cached_property
     def settings(self) -> KeystoreSettings:
@@ -195,7 +205,8 @@ class KeystoreView:
         unknown = sorted(set(names) - set(self.enclaves()))
         if unknown:
             raise InvalidInputError(
-                f"no enclave {', '.join(unknown)} in {printable(self.root)}; secure-keystore list shows all"
+                f"no enclave {', '.join(unknown)} in {printable(self.root)}\n"
+                f"try: secure-keystore list {shlex.quote(str(self.root))}"
             )
 
     def matching(self, patterns: Iterable[str]) -> list[str]:
@@ -205,7 +216,8 @@ class KeystoreView:
             found = [name for name in names if fnmatchcase(name, pattern)]
             if not found:
                 raise InvalidInputError(
-                    f"no enclave matches {printable(pattern)}; secure-keystore list shows all"
+                    f"no enclave matches {printable(pattern)}\n"
+                    f"try: secure-keystore list {shlex.quote(str(self.root))}"
                 )
             fitting.update(found)
         return [name for name in names if name in fitting]

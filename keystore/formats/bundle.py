@@ -145,7 +145,13 @@ def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
                 f"--require-ca {printable(one)}: say what that CA may do, identity=SHA256 or permissions=SHA256, as "
                 "secure-keystore export prints it"
             )
-        found[_ROLES[role]].add(digest.replace(":", "").lower())
+        plain = digest.replace(":", "").lower()
+        if re.fullmatch("[0-9a-f]{64}", plain) is None:
+            raise InvalidInputError(
+                f"--require-ca {printable(one)}: {len(plain)} characters, and a SHA-256 fingerprint has 64 hex digits\n"
+                "try: secure-keystore export again where the CA is; its last line has the options to copy"
+            )
+        found[_ROLES[role]].add(plain)
     if missing := [role.use for role in Role if not found[role]]:
         raise InvalidInputError(f"no CA is named for {missing[0]}: --require-ca {missing[0]}=SHA256")
     return {role: frozenset(listed) for role, listed in found.items()}

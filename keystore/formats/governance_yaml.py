@@ -38,7 +38,9 @@ class _Domain(Strict, frozen=True):
     topic_rules: list[_Topic] = Field(default_factory=list)
 
 
-class _Document(StrictDocument, frozen=True):
+class GovernanceDocument(StrictDocument, frozen=True):
+    """Content of a governance in YAML."""
+
     domain_rules: list[_Domain]
 
 
@@ -55,7 +57,7 @@ def governance_of(path: Path) -> Governance:
 
 def parse_governance_yaml(text: bytes, where: str) -> Governance:
     """Read ``governance.yaml``. Raises ``InvalidInputError``, which begins with ``where``."""
-    document = parse_given(_Document, text, where)
+    document = parse_given(GovernanceDocument, text, where)
     if not document.domain_rules:
         raise InvalidInputError(f"{where}: domain_rules: at least one rule is needed")
     try:

@@ -121,6 +121,13 @@ def utc_now() -> datetime:
     return datetime.now(timezone.utc).replace(microsecond=0)
 
 
+def why_not_valid(validity: Validity, now: datetime) -> str:
+    """Return in words why ``now`` is outside of ``validity``."""
+    if now < validity.not_before:
+        return f"not valid before {iso(validity.not_before)}, and this clock says {iso(now)}"
+    return f"expired at {iso(validity.not_after)}"
+
+
 def iso(time: datetime) -> str:
     """Render ``2030-12-31T00:00:00Z``, for reports."""
     return time.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
@@ -12,7 +13,7 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 from cryptography.hazmat.primitives.serialization import load_der_public_key
 
-from keystore.errors import SigningUnavailableError
+from keystore.errors import InvalidInputError, SigningUnavailableError, printable
 from keystore.formats.certificate import CertificateFacts
 from keystore.signing.private_key import key_pem, load_private_key, spki
 
@@ -20,8 +21,22 @@ _CURVES = {"secp224r1": "P-224", "secp256r1": "P-256", "secp384r1": "P-384", "se
 
 
 def fingerprints(named: Iterable[str]) -> frozenset[str]:
-    """Return SHA-256 fingerprints, which openssl writes with colons, in the form of ``fingerprint``."""
-    return frozenset(one.replace(":", "").lower() for one in named)
+    """Return SHA-256 fingerprints, which openssl writes with colons, in the form of ``fingerprint``.
+
+    Raises:
+        InvalidInputError: A text is not a fingerprint.
+    """
+    return frozenset(map(_fingerprint, named))
+
+
+def _fingerprint(text: str) -> str:
+    plain = text.rpartition("=")[2].replace(":", "").lower()
+    if re.fullmatch("[0-9a-f]{64}", plain) is None:
+        raise InvalidInputError(
+            f"{printable(text)} is not the SHA-256 fingerprint of a CA: 64 hex digits, with or without colons\n"
+            "try: openssl x509 -noout -fingerprint -sha256 -in KEYSTORE/public/permissions_ca.cert.pem"
+        )
+    return plain
 
 
 def signature_is_valid(key: Any, signature: bytes, data: bytes, digest: hashes.HashAlgorithm) -> bool:

@@ -7,6 +7,7 @@ that is taken away.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -172,7 +173,8 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
     ]
     if not mine:
         raise InvalidInputError(
-            f"no launch {printable(owner)} has a share in {printable(root)}; secure-keystore shares lists all"
+            f"no launch {printable(owner)} has a share in {printable(root)}\n"
+            f"try: secure-keystore shares {shlex.quote(str(root))}"
         )
     refuse_running(root, (one.enclave for one in mine))
     return mine

@@ -8,6 +8,7 @@ something ends soon and 4 something has ended (``status``); 75 the keystore is i
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -58,10 +59,18 @@ def _with_keystore(line: CommandLine, project: Project | None) -> argparse.Names
             elsewhere.enclaves = [str(arguments.keystore), *arguments.enclaves]
             return elsewhere
     if arguments.keystore is None and not _is_optional(line):
+        words = [word for each in line.actions if not each.option_strings for word in _words(arguments, each)]
+        if words and Path(words[0]).is_dir():
+            needed = next(
+                each.metavar or each.dest.upper() for each in line.actions[1:] if not each.option_strings
+            )
+            raise InvalidInputError(
+                f"{needed} is missing behind the keystore {words[0]}\ntry: secure-keystore {line.options.verb} --help"
+            )
+        only = f"; {' '.join(words)} is what it should work on" if words else ""
         raise InvalidInputError(
-            "which keystore? nothing names one\n"
-            f"try: secure-keystore {line.options.verb} ks, with the folder of your keystore for ks; or set "
-            "ROS_SECURITY_KEYSTORE, or write an enclaves.yaml (secure-plan init)"
+            f"no keystore is named, neither here nor in ROS_SECURITY_KEYSTORE or enclaves.yaml{only}\n"
+            f"try: {shlex.join(['secure-keystore', line.options.verb, 'KEYSTORE', *words])}"
         )
     return arguments
 
@@ -69,6 +78,11 @@ def _with_keystore(line: CommandLine, project: Project | None) -> argparse.Names
 def _is_enclave(word: Path | None) -> bool:
     """Return whether the first word is an enclave rather than the folder of a keystore."""
     return word is not None and word.is_absolute() and not word.exists()
+
+
+def _words(arguments: argparse.Namespace, action: argparse.Action) -> list[str]:
+    value = getattr(arguments, action.dest) or []
+    return [str(value)] if isinstance(value, (str, Path)) else [str(each) for each in value]
 
 
 def _is_optional(line: CommandLine) -> bool:

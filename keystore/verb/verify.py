@@ -14,6 +14,7 @@ from enclave_common.command_line import PATH, TEXTS
 from enclave_common.words import counted
 from keystore.errors import printable
 from keystore.formats.governance_yaml import governance_of
+from keystore.signing.public_key import fingerprints
 from keystore.verb import common
 from keystore.verification import Requirements, verify
 
@@ -34,6 +35,7 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the findings. Returns 1 when one of them is an error."""
+    fingerprints(one.partition("=")[2] or one for one in arguments.require_ca)  # refuse what is none
     required = Requirements(
         governance_of(arguments.require_governance) if arguments.require_governance else None,
         tuple(arguments.require_ca),

@@ -16,7 +16,7 @@ from keystore.formats.certificate import CertificateFacts
 from keystore.formats.governance import Governance, parse_governance
 from keystore.formats.register import Register
 from keystore.formats.role import Role
-from keystore.formats.validity import iso
+from keystore.formats.validity import why_not_valid
 from keystore.signing import smime
 from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
@@ -166,6 +166,6 @@ def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
     if not validity.covers(now):
         yield Finding(
             Severity.ERROR, "crl-expired", layout.CRL,
-            f"valid from {iso(validity.not_before)} to {iso(validity.not_after)}: all participants are refused",
+            f"{why_not_valid(validity, now)}: all participants are refused",
             repair.renew(view.root, note="then deploy"),
         )  # fmt: skip

@@ -38,7 +38,7 @@ from keystore.formats.subject import (
     scheme_of,
     subject_name,
 )
-from keystore.formats.validity import Validity, iso
+from keystore.formats.validity import Validity, iso, why_not_valid
 from keystore.signing import smime
 from keystore.signing.public_key import (
     cyclone_takes,
@@ -208,10 +208,8 @@ class _EnclaveCheck:
                 f"valid until {iso(facts.validity.not_after)}, its CA until {iso(issuer.validity.not_after)}",
             )  # fmt: skip
         if not facts.validity.covers(self._now):
-            yield self.error(
-                "expired", layout.CERT,
-                f"valid from {iso(facts.validity.not_before)} to {iso(facts.validity.not_after)}",
-            )  # fmt: skip
+            code = "expired" if facts.validity.not_after < self._now else "not-yet-valid"
+            yield self.error(code, layout.CERT, why_not_valid(facts.validity, self._now))
         if facts.serial in self._revoked:
             remedy = (self._enclave, "--new-keys")
             fix = repair.renew(self._view.root, *remedy, note="or secure-keystore remove")
@@ -344,8 +342,8 @@ class _EnclaveCheck:
 
     def _validity(self, permissions: Validity, certificate: Validity) -> Iterator[Finding]:
         if not permissions.covers(self._now):
-            dates = f"valid from {iso(permissions.not_before)} to {iso(permissions.not_after)}"
-            yield self.error("permissions-expired", layout.PERMISSIONS, dates)
+            code = "permissions-expired" if permissions.not_after < self._now else "permissions-not-yet-valid"
+            yield self.error(code, layout.PERMISSIONS, why_not_valid(permissions, self._now))
         elif permissions.not_after != certificate.not_after:
             text = "not valid as long as the certificate"
             yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())

@@ -96,16 +96,22 @@ def map_of(
     others: Checker | None = None,
     patterns: Mapping[str, Checker] | None = None,
     also: Callable[[YamlMap, str], None] | None = None,
+    example: str = "",
 ) -> Checker:
-    """Check for a mapping: known ``keys``, else by ``patterns``, else ``others``; an unknown key is an error."""
+    """Check for a mapping: known ``keys``, else by ``patterns``, else ``others``; an unknown key is an error.
+
+    ``example`` is a valid one, shown where a required key is missing.
+    """
 
     def check(value: YamlValue, what: str) -> None:
         if not isinstance(value, YamlMap):
             fail(value, f"{what} must be a mapping")
             return
-        for name in required:
-            if name not in value.items:
-                fail(value, f"{what} needs the key '{name}'")
+        if missing := [f"'{name}'" for name in required if name not in value.items]:
+            shown_example = f", for example {example}" if example else ""
+            fail(
+                value, f"{what} needs the key{'s' if missing[1:] else ''} {', '.join(missing)}{shown_example}"
+            )
         for name, each in value.items.items():
             by_pattern = (c for p, c in (patterns or {}).items() if re.fullmatch(p, name))
             checker = (keys or {}).get(name) or next(by_pattern, others)

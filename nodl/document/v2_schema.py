@@ -37,7 +37,7 @@ def check_document(root: YamlValue) -> YamlMap:
 def _depth_with_keep_last(qos: YamlMap, what: str) -> None:
     history = qos.items["history"]
     if isinstance(history, YamlScalar) and history.value == "KEEP_LAST" and "depth" not in qos.items:
-        fail(qos, f"{what} needs the key 'depth' because history is KEEP_LAST")
+        fail(qos, f"{what} needs the key 'depth' because history is KEEP_LAST, for example depth: 10")
 
 
 def _bytes_by_default(parameter: YamlMap, what: str) -> None:
@@ -58,6 +58,7 @@ _NAME = text_of(
     "a ROS name (letters, digits, '_' and '/', starting with '/', '~' or a letter; no wildcards)",
 )
 _TYPE = text_of(TYPE_PATTERN, "an interface type such as std_msgs/msg/String")
+_QOS_EXAMPLE = "{history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
 _QOS = map_of(
     {
         "history": one_of("KEEP_LAST", "KEEP_ALL", "SYSTEM_DEFAULT"),
@@ -71,9 +72,12 @@ _QOS = map_of(
     },
     required=("history", "reliability"),
     also=_depth_with_keep_last,
+    example=_QOS_EXAMPLE,
 )
 _TOPIC = map_of(
-    {"name": _NAME, "type": _TYPE, "qos": _QOS, "description": text_of()}, ("name", "type", "qos")
+    {"name": _NAME, "type": _TYPE, "qos": _QOS, "description": text_of()},
+    ("name", "type", "qos"),
+    example=f"{{name: scan, type: sensor_msgs/msg/LaserScan, qos: {_QOS_EXAMPLE}}}",
 )
 _SERVICE = map_of({"name": _NAME, "type": _TYPE, "qos": _QOS, "description": text_of()}, ("name", "type"))
 _ACTION = map_of({"name": _NAME, "type": _TYPE, "description": text_of()}, ("name", "type"))

@@ -110,7 +110,7 @@ def test_a_tilde_is_the_home_and_never_a_folder_of_that_name(here: Path) -> None
 
 def test_no_keystore_named_anywhere_is_wrong_usage(here: Path) -> None:
     told = run("secure-keystore", "verify")
-    assert told.returncode == 2 and "\ntry: secure-keystore verify ks" in told.stderr
+    assert told.returncode == 2 and "\ntry: secure-keystore verify KEYSTORE" in told.stderr
 
 
 @pytest.mark.parametrize(

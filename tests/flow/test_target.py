@@ -37,7 +37,7 @@ REFUSED = {
     "the same, with an argument": (["nosuch.launch.xml", "a:=b"], "does not exist"),
     "an unknown package": (
         ["nosuch_package", "x.launch.xml"],
-        "'nosuch_package' not found, searched:\n  {prefix}",
+        "'nosuch_package' not found, searched: {prefix}",
     ),
     "a file the package does not have": (["demo", "nosuch.launch.xml"], "nosuch.launch.xml"),
     "several files of that name": (

@@ -10,6 +10,7 @@ from enclave_addons.library import Hit, Library
 from enclave_addons.library.document import LibraryDocument
 from enclave_common.command_line import TEXT, TEXTS, FromProject, Option
 from enclave_common.terminal import printable
+from enclave_common.words import did_you_mean
 from nodl.ament_index import package_version, search_prefixes
 from nodl.verb import PREFIX, Verb
 from nodl.verb.show import description_lines
@@ -68,7 +69,16 @@ def _found(arguments: argparse.Namespace) -> Hit | None:
     recorded = library.recorded(arguments.package, arguments.name, distro=arguments.distro, version=version)
     hit = hit or next(iter(recorded), None) or library.of_class(arguments.name, distro=arguments.distro)
     if hit is None:
-        print(f"the library has no document of {arguments.package}/{arguments.name}", file=sys.stderr)
+        known = {each.package: each for each in library.documents()}
+        programs = [
+            name
+            for each in library.documents()
+            if each.package == arguments.package
+            for name in each.programs
+        ]
+        meant = did_you_mean(arguments.name, programs) if programs else did_you_mean(arguments.package, known)
+        print(f"the library has no document of {arguments.package}/{arguments.name}{meant}", file=sys.stderr)
+        print("try: secure-nodl library list", file=sys.stderr)
     return hit
 
 

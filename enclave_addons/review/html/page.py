@@ -8,7 +8,7 @@ import base64
 import hashlib
 import html
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -114,11 +114,11 @@ def _script(name: str) -> str:
 
 def _body(contents: ReportContents) -> str:
     sections = (
-        ("graph", "Graph", _GRAPH),
         ("findings", "Findings", _findings(contents)),
-        ("permissions", "Permissions", _FILTER + _permissions(contents)),
+        ("graph", "Graph", _GRAPH),
+        ("permissions", "Enclaves", _permissions(contents)),
         ("flows", "Flows", _flows(contents)),
-        ("statistics", "Statistics", _statistics(contents)),
+        ("statistics", "Numbers", _statistics(contents)),
         ("expiry", "Expiry", _expiry(contents.endings)),
     )
     links = "".join(f'<a href="#{name}">{heading}</a>' for name, heading, _ in sections)
@@ -128,16 +128,32 @@ def _body(contents: ReportContents) -> str:
         for name, heading, body in sections
     )
     return (
-        f"<header><h1>{text(contents.title)}</h1>\n<p>{text(in_one_sentence(contents))}</p>\n"
-        f'<nav aria-label="Sections">{links}</nav>\n'
-        '<button type="button" id="theme" class="screen">light or dark</button></header>\n'
+        f'<header><div class="title"><h1>{text(contents.title)}</h1>\n'
+        '<button type="button" id="theme" class="screen">light or dark</button></div>\n'
+        f'<p class="tally">{_tally(contents)}</p>\n<p>{text(in_one_sentence(contents))}</p></header>\n'
+        f'<nav aria-label="Sections" class="screen">{links}</nav>\n'
         f"<main>\n{parts}</main>\n<footer>Made by secure-plan {__version__}. The graph is drawn by Cytoscape.js "
         "(MIT licence).</footer>\n"
     )
 
 
+def _tally(contents: ReportContents) -> str:
+    """Return the numbers that a reader looks for first, as badges."""
+    severities = [diagnostic.severity for diagnostic, accepted in contents.judged if accepted is None]
+    counts = [(severities.count(each), each, each) for each in ("error", "warning")]
+    counts += [
+        (len(contents.judged) - len(severities), "accepted finding", "accepted"),
+        (sum(member.known for member in contents.graph.members), "node", "plain"),
+        (len(contents.graph.enclaves), "enclave", "plain"),
+    ]
+    shown = [each for each in counts if each[0] or each[2] == "plain"]
+    return " ".join(
+        f'<span class="badge {kind}">{counted(number, what)}</span>' for number, what, kind in shown
+    )
+
+
 _FILTER = (
-    '<p class="screen"><label>Only rows with <input type="search" id="row-filter" autocomplete="off"></label> '
+    '<p class="screen tools"><label>Only rows with <input type="search" id="row-filter" autocomplete="off"></label> '
     '<label><input type="checkbox" id="rows-built-in"> what every node has</label></p>\n'
 )
 _GRAPH = """\
@@ -150,20 +166,20 @@ _GRAPH = """\
 <label><input type="checkbox" id="show-action" checked> actions</label>
 <label><input type="checkbox" id="hide-built-in" checked> hide built-ins</label>
 <label><input type="checkbox" id="only-near"> only these and their neighbours</label>
-<button type="button" id="zoom-in" aria-label="zoom in">+</button>
+<span class="zoom"><button type="button" id="zoom-in" aria-label="zoom in">+</button>
 <button type="button" id="zoom-out" aria-label="zoom out">&minus;</button>
-<button type="button" id="fit">fit</button>
+<button type="button" id="fit">fit</button></span>
 </div>
 <p id="status" class="screen" role="status"></p>
-<div class="graph-and-detail">
 <div id="canvas" tabindex="0" role="application" aria-label="Graph of the launch: arrow keys move it, plus and minus \
-zoom, 0 fits it; the list beside it reaches every element by keyboard"></div>
-<aside class="screen"><ul id="matches" aria-label="Elements that match the search"></ul>
-<div id="detail" tabindex="-1" aria-live="polite"><p>Choose an element in the list or in the graph.</p></div></aside>
-</div>
-<p class="key">Large box: enclave or namespace. Rounded box: node. Ellipse: topic. Rectangle: service. Hexagon: \
-action. Dashed: interfaces unknown, or a name with wildcards. Arrows run from who sends or calls to \
-who receives or serves.</p>
+zoom, 0 fits it; the list below it reaches every element by keyboard"></div>
+<ul class="legend" aria-label="Legend"><li><span class="swatch group"></span>enclave or namespace</li>
+<li><span class="swatch node"></span>node</li><li><span class="swatch topic"></span>topic</li>
+<li><span class="swatch service"></span>service</li><li><span class="swatch action"></span>action</li>
+<li><span class="swatch doubtful"></span>not known, or with wildcards</li>
+<li><span class="swatch arrow"></span>from who sends or calls to who receives or serves</li></ul>
+<div class="list-and-detail screen"><ul id="matches" aria-label="Elements that match the search"></ul>
+<div id="detail" tabindex="-1" aria-live="polite"><p>Choose an element in the list or in the graph.</p></div></div>
 """
 
 
@@ -185,16 +201,26 @@ def table(caption: str, headings: Iterable[str], rows: Iterable[str]) -> str:
     """Return a table; ``caption`` and ``headings`` are trusted text."""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     body = "\n".join(rows)
-    return f"<table><caption>{caption}</caption><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>\n"
+    return (
+        f'<div class="scroll"><table><caption>{caption}</caption><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{body}\n</tbody></table></div>\n"
+    )
 
 
 def _permissions(contents: ReportContents) -> str:
-    """Return a folded table for each enclave; interfaces that every node has are only counted at first."""
-    parts = []
+    """Return a list of the enclaves to choose from, and a table for each.
+
+    Interfaces that every node has are only counted at first.
+    """
+    names, parts = [], []
     for number, (enclave, uses) in enumerate(contents.uses_of().items()):
         own = [use for use in uses if not use.built_in]
         members = sum(member.enclave == enclave for member in contents.graph.members)
         opened = " open" if number == 0 else ""
+        names.append(
+            f'<li><button type="button" data-enclave="{number}"><code>{text(enclave)}</code> '
+            f'<span class="count">{len(own)}</span></button></li>'
+        )
         parts.append(
             f'<details class="enclave" data-enclave="{number}"{opened}><summary><code>{text(enclave)}</code> '
             f"{counted(members, 'node')}, {counted(len(own), 'permission')} requested, "
@@ -206,7 +232,10 @@ def _permissions(contents: ReportContents) -> str:
             )
             + "</details>\n"
         )
-    return "".join(parts) or "<p>This launch has no enclaves.</p>"
+    if not parts:
+        return "<p>This launch has no enclaves.</p>"
+    chooser = f'<ul id="enclaves" class="screen" aria-label="Enclaves">{"".join(names)}</ul>\n'
+    return f'{_FILTER}<div class="enclaves">{chooser}<div class="tables">{"".join(parts)}</div></div>\n'
 
 
 def _permission(graph: EnclaveGraph, use: ChannelUse) -> str:
@@ -226,28 +255,37 @@ def _permission(graph: EnclaveGraph, use: ChannelUse) -> str:
 
 
 def _findings(contents: ReportContents) -> str:
-    """Return what ``check`` found, the most severe first and accepted findings last."""
+    """Return what ``check`` found, the most severe first and accepted findings last; of one kind together."""
     if not contents.judged:
         return "<p>Nothing was found.</p>"
-    ordered = sorted(contents.judged, key=lambda item: (item[1] is not None, item[0].severity))
-    return table(
-        "Findings of secure-plan check",
-        ("severity", "rule", "place", "what", "what to do"),
-        (_finding(diagnostic, accepted) for diagnostic, accepted in ordered),
-    )
+    kinds: dict[tuple[str, str, str], list[Diagnostic]] = {}
+    for diagnostic, accepted in sorted(
+        contents.judged, key=lambda item: (item[1] is not None, item[0].severity)
+    ):
+        severity = diagnostic.severity if accepted is None else "accepted"
+        fix = diagnostic.remedy if accepted is None else f"accepted: {accepted}"
+        kinds.setdefault((severity, diagnostic.code, fix), []).append(diagnostic)
+    items = "".join(_finding(*kind, found) for kind, found in kinds.items())
+    return f'<ul class="findings">\n{items}</ul>\n'
 
 
-def _finding(diagnostic: Diagnostic, accepted: str | None) -> str:
-    severity = diagnostic.severity if accepted is None else "accepted"
-    remedy = diagnostic.remedy if accepted is None else f"accepted: {accepted}"
-    return row(
-        (
-            f'<strong class="{severity}">{severity}</strong>',
-            f"<code>{text(diagnostic.code)}</code>",
-            text(diagnostic.place),
-            text(diagnostic.text),
-            text(remedy),
-        )
+_AT_ONCE = 4  # findings of one kind; the others are folded
+
+
+def _finding(severity: str, code: str, fix: str, found: Sequence[Diagnostic]) -> str:
+    number = f' <span class="count">{len(found)} times</span>' if len(found) > 1 else ""
+    shown = [
+        f'<li><span class="place">{text(each.place)}</span> {text(each.text)}</li>'
+        if each.place
+        else f"<li>{text(each.text)}</li>"
+        for each in found
+    ]
+    rest = shown[_AT_ONCE:]
+    more = f"<details><summary>{len(rest)} more</summary><ul>{''.join(rest)}</ul></details>" if rest else ""
+    remedy = f'<p class="fix">{text(fix)}</p>' if fix else ""
+    return (
+        f'<li class="finding"><p class="kind"><strong class="badge {severity}">{severity}</strong> '
+        f"<code>{text(code)}</code>{number}</p><ul>{''.join(shown[:_AT_ONCE])}</ul>{more}{remedy}</li>\n"
     )
 
 
@@ -277,15 +315,13 @@ def _influence(one: Influence) -> str:
 
 
 def _statistics(contents: ReportContents) -> str:
-    """Count the plan, in the columns of table 2 of the LiSA4ROS2 paper."""
+    """Count what the plan has."""
     rows = (
-        row((one.column, one.meaning, str(one.all), str(one.system)), attributes=' class="numbers"')
+        row((one.meaning, str(one.all), str(one.system)), attributes=' class="numbers"')
         for one in contents.counts
     )
     return table(
-        "As in table 2 of the LiSA4ROS2 paper, without ros_discovery_info, which is the middleware's",
-        ("column", "what", "all", "of them of every node"),
-        rows,
+        "What the launch has, and how much of it every node has", ("what", "all", "of every node"), rows
     )
 
 

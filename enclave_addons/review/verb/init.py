@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     file = Path(os.path.abspath(folder)) / FILE_NAME
     if file.exists():
         raise UsageError(
-            f"{file} exists already, and is left as it is\ntry: secure-plan show -v FILE, which says what it sets"
+            f"{file} exists already, and is left as it is\ntry: secure-plan doctor -v PACKAGE LAUNCH_FILE"
         )
     with translated(OSError, UsageError, f"{file}: "):
         write_text(file, CONTENT)

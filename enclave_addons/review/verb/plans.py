@@ -88,6 +88,9 @@ def _planned(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, 
     return plan_document(plan)
 
 
+_SAVE = "try: secure-plan show --format json PACKAGE LAUNCH_FILE > plan.json"
+
+
 def _resolving(options: argparse.Namespace) -> ResolveOptions:
     return replace(resolve_options(options), progress=progress("analysing", quiet=options.quiet))
 
@@ -101,13 +104,17 @@ def _saved(file: Path) -> tuple[Mapping[str, Any], DryRun]:
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
+        place = ".".join(map(str, error.errors()[0]["loc"]))
         raise UsageError(
-            f"{file} is not the JSON of secure-launch --dry-run: {place}: {first['msg']}"
+            f"{file} is not the JSON of secure-launch --dry-run: {place!r} is missing or not as it should be\n{_SAVE}"
         ) from error
     except (TypeError, ValueError, RecursionError) as error:
-        raise UsageError(f"{file} is not the JSON of secure-launch --dry-run: {error}") from error
+        what = (
+            f"line {error.lineno} is not JSON"
+            if isinstance(error, json.JSONDecodeError)
+            else "no plan is in it"
+        )
+        raise UsageError(f"{file} is not the JSON of secure-launch --dry-run: {what}\n{_SAVE}") from error
     _refuse_misfits(plan, file)
     return document, plan
 

@@ -137,7 +137,7 @@ def test_check_as_sarif_points_at_lines_below_the_working_directory(
     [
         ("{", "is not the JSON of secure-launch --dry-run"),
         ("[]", "is not the JSON of secure-launch --dry-run"),
-        ('{"version": 2}', "is not the JSON of secure-launch --dry-run: version"),
+        ('{"version": 2}', "is not the JSON of secure-launch --dry-run: 'version'"),
     ],
 )
 def test_what_is_not_a_plan_is_wrong_usage(run: Run, tmp_path: Path, content: str, why: str) -> None:

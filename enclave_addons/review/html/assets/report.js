@@ -5,7 +5,10 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const byId = (id) => document.getElementById(id);
   const MOST_MATCHES = 200; // listed at once; the rest is counted
-  const LAYERED = 60; // elements up to which the graph is arranged along its arrows; more stand in rows, at once
+  const LAYERED = 100; // nodes and names up to which the graph is arranged along its arrows; more stand in rows, at once
+  const READABLE = 0.5; // magnification below which labels cannot be read
+  const LARGEST = 1.4; // magnification that fits a small graph
+  const NARROW = 600; // pixels below which arrows run downwards
   const MANY = 2000; // elements from which drawing is made cheaper
   const LONGEST_LABEL = 26; // the end of a ROS name says more than its beginning
 
@@ -39,10 +42,10 @@
     const text = color("text");
     const box = { "background-color": color("group"), "border-color": color("line"), "border-width": 1, label: "data(label)",
       color: text, "font-size": 13, "min-zoomed-font-size": 5, "font-weight": "bold", "text-valign": "top", shape: "round-rectangle", padding: 14 };
-    const named = { label: "data(label)", color: text, "font-size": 12, "min-zoomed-font-size": 5, "text-valign": "center", "text-wrap": "ellipsis",
-      "text-max-width": 150, width: 160, height: 30, "border-width": 1, "border-color": color("line") };
+    const named = { label: "data(label)", color: text, "font-size": 12, "min-zoomed-font-size": 5, "text-valign": "center",  height: 30, "border-width": 1, "border-color": color("line") };
     return [
       { selector: "node", style: named },
+      { selector: "node[width]", style: { width: "data(width)" } },
       { selector: "node.group", style: { ...box, "text-wrap": "none" } },
       { selector: "node.node", style: { "background-color": color("node"), shape: "round-rectangle" } },
       { selector: "node.topic", style: { "background-color": color("topic"), shape: "ellipse" } },
@@ -61,6 +64,8 @@
   }
 
   const shortened = (name) => (name.length > LONGEST_LABEL ? `\u2026${name.slice(1 - LONGEST_LABEL)}` : name);
+
+  const widthOf = (element) => Math.max(80, shortened(element.name).length * 6.8 + (element.what === "action" ? 50 : 24));
 
   function isShown(element) {
     if (element.what === "node" || element.what === "enclave") return true;
@@ -89,7 +94,7 @@
     const nodes = [...members, ...channels].filter(isShown).map((element) => ({
       group: "nodes",
       classes: `${element.what}${element.known === false || element.pattern ? " doubtful" : ""}`,
-      data: { id: element.id, label: shortened(element.name), parent: parentOf(element, grouping, groups) },
+      data: { id: element.id, label: shortened(element.name), width: widthOf(element), parent: parentOf(element, grouping, groups) },
     }));
     for (const enclave of enclaves) { // what only a policy file says has no node to begin at
       if (enclave.uses.length) groups.set(enclave.id, groups.get(enclave.id)
@@ -111,38 +116,96 @@
       boxes.set(key, [...(boxes.get(key) || []), each.data.id]);
     }
     const sizes = [...boxes.values()].map((ids) => ({ ids, columns: Math.ceil(Math.sqrt(ids.length / 3)) }));
-    const width = 190 * Math.ceil(Math.sqrt(inner.length / 2));
+    const width = 225 * Math.ceil(Math.sqrt(inner.length / 2));
     let left = 0, top = 0, tallest = 0;
     for (const { ids, columns } of sizes) {
-      const across = columns * 180 + 50, down = Math.ceil(ids.length / columns) * 42 + 60;
+      const across = columns * 215 + 50, down = Math.ceil(ids.length / columns) * 42 + 60;
       if (left > 0 && left + across > width) { left = 0; top += tallest; tallest = 0; }
       ids.forEach((id, number) => {
-        positions[id] = { x: left + (number % columns) * 180, y: top + Math.floor(number / columns) * 42 };
+        positions[id] = { x: left + (number % columns) * 215, y: top + Math.floor(number / columns) * 42 };
       });
       left += across;
       tallest = Math.max(tallest, down);
     }
-    return { name: "preset", positions, fit: true, padding: 20 };
+    return { name: "preset", positions, fit: false };
   }
 
-  const ALONG_ARROWS = { name: "dagre", rankDir: "LR", animate: false, fit: true, padding: 30, nodeSep: 40, rankSep: 90 };
+  const alongArrows = () => ({ name: "dagre", rankDir: byId("canvas").clientWidth < NARROW ? "TB" : "LR", animate: false,
+    fit: false, nodeSep: 24, rankSep: 70 });
 
   let graph = null;
+
+  // Parts without an arrow or a box between them, as lists of nodes.
+  function partsOf(shown) {
+    const leaves = shown.nodes(":childless");
+    const part = new Map(leaves.map((node) => [node.id(), node.id()]));
+    const root = (id) => { while (part.get(id) !== id) id = part.get(id); return id; };
+    const join = (one, other) => part.set(root(one), root(other));
+    shown.edges().forEach((edge) => {
+      if (part.has(edge.source().id()) && part.has(edge.target().id())) join(edge.source().id(), edge.target().id());
+    });
+    shown.nodes(":orphan").forEach((box) => {
+      const inside = box.descendants(":childless").filter((node) => part.has(node.id()));
+      inside.forEach((node) => join(node.id(), inside[0].id()));
+    });
+    const parts = new Map();
+    leaves.forEach((node) => {
+      const id = root(node.id());
+      parts.set(id, (parts.get(id) || graph.collection()).union(node));
+    });
+    return [...parts.values()];
+  }
+
+  // What dagre arranges one below the other stands side by side, in rows of about the canvas' shape.
+  function pack(shown) {
+    const gap = 40;
+    const boxes = partsOf(shown).map((nodes) => ({ nodes, box: nodes.union(nodes.ancestors()).boundingBox() }));
+    if (boxes.length < 2) return;
+    const area = boxes.reduce((sum, each) => sum + (each.box.w + gap) * (each.box.h + gap), 0);
+    const shape = byId("canvas").clientWidth / (window.innerHeight * 0.7);
+    const width = Math.max(Math.sqrt(area * shape), ...boxes.map((each) => each.box.w + gap));
+    let left = 0, top = 0, tallest = 0;
+    graph.batch(() => {
+      for (const { nodes, box } of boxes.sort((one, other) => other.box.h - one.box.h)) {
+        if (left > 0 && left + box.w > width) { left = 0; top += tallest + gap; tallest = 0; }
+        nodes.shift({ x: left - box.x1, y: top - box.y1 });
+        left += box.w + gap;
+        tallest = Math.max(tallest, box.h);
+      }
+    });
+  }
+
+  // The canvas is as wide as the page, and as high as what is seen needs at that width.
+  function fit(seen) {
+    const shown = seen || graph.elements(":visible");
+    const box = shown.boundingBox();
+    const width = byId("canvas").clientWidth;
+    const wanted = box.w > 0 ? Math.min(width / (box.w + 40), LARGEST) * (box.h + 40) : 0;
+    byId("canvas").style.height = `${Math.max(260, Math.min(wanted, window.innerHeight * 0.75))}px`;
+    graph.resize();
+    graph.fit(shown, 20);
+    if (graph.zoom() > LARGEST) {
+      graph.zoom(LARGEST);
+      graph.center(shown);
+    }
+  }
 
   let home = new Map(); // where elements stand while nothing is left out
   let regrouped = false; // what is seen is arranged by itself
 
   function draw() {
     const elements = graphElements();
-    const few = elements.filter((each) => each.group === "nodes").length <= LAYERED;
+    const few = elements.filter((each) => each.group === "nodes" && each.classes !== "group").length <= LAYERED;
     if (graph) graph.destroy();
     graph = window.cytoscape({ container: byId("canvas"), elements, style: style(), minZoom: 0.02, maxZoom: 4,
-      layout: few ? ALONG_ARROWS : inRows(elements), userZoomingEnabled: document.activeElement === byId("canvas"),
+      layout: few ? alongArrows() : inRows(elements), userZoomingEnabled: document.activeElement === byId("canvas"),
       hideEdgesOnViewport: elements.length > MANY, textureOnViewport: elements.length > MANY });
+    if (few) pack(graph.elements());
     home = new Map(graph.nodes().map((node) => [node.id(), { ...node.position() }]));
     regrouped = isMarked = false;
     graph.on("tap", "node, edge", (event) => choose(event.target.id()));
     graph.on("tap", (event) => { if (event.target === graph) choose(null); });
+    fit();
     search();
   }
 
@@ -154,8 +217,14 @@
   const searched = () => byId("search").value.toLowerCase().split(/\s+/).filter(Boolean);
   const isSearching = () => searched().length > 0;
 
+  let proposed = null; // what is shown first of a large launch, until somebody searches
+
   function search() {
     const words = searched();
+    if (words.length && proposed) {
+      if (chosen === proposed) choose(null);
+      proposed = null;
+    }
     found = all.filter((element) => isShown(element) && words.every((word) => element.haystack.includes(word)));
     byId("status").textContent = words.length ? `${found.length} of ${all.filter(isShown).length} elements match`
       : `${members.length} nodes, ${enclaves.length} enclaves, ${channels.filter(isShown).length} names shown`;
@@ -190,7 +259,9 @@
     const only = byId("only-near").checked && isMarked;
     const matches = searching ? graph.collection(found.map((element) => graph.getElementById(element.id))) : graph.collection();
     const centre = searching && !(only && chosen) ? matches : picked;
-    const near = centre.union(centre.descendants()).closedNeighborhood();
+    const nearest = centre.union(centre.descendants()).closedNeighborhood();
+    // Of an enclave its names are not enough: who is at their other end is seen, too.
+    const near = picked.isParent() ? nearest.union(nearest.filter(".topic, .service, .action").closedNeighborhood()) : nearest;
     const seen = isMarked ? near.union(near.ancestors()) : graph.elements();
     graph.batch(() => {
       graph.elements(".match, .faded, .near, .away").removeClass("match faded near away");
@@ -203,12 +274,14 @@
 
   // A part that is looked at alone is arranged for itself; after that everything returns to its place.
   function arrangeSeen(seen, only) {
-    if (only && seen.nodes().length <= LAYERED) {
-      seen.layout(ALONG_ARROWS).run();
+    if (only && seen.nodes(":childless").length <= LAYERED) {
+      seen.layout(alongArrows()).run();
+      pack(seen);
+      fit(seen);
       regrouped = true;
     } else if (regrouped) {
       graph.batch(() => graph.nodes(":childless").forEach((node) => node.position(home.get(node.id()))));
-      graph.fit(undefined, 20);
+      fit();
       regrouped = false;
     }
   }
@@ -341,7 +414,7 @@
   const KEYS = {
     ArrowLeft: () => graph.panBy({ x: 60, y: 0 }), ArrowRight: () => graph.panBy({ x: -60, y: 0 }),
     ArrowUp: () => graph.panBy({ x: 0, y: 60 }), ArrowDown: () => graph.panBy({ x: 0, y: -60 }),
-    "+": () => zoomBy(1.25), "-": () => zoomBy(0.8), 0: () => graph.fit(undefined, 20), Escape: () => choose(null),
+    "+": () => zoomBy(1.25), "-": () => zoomBy(0.8), 0: () => fit(), Escape: () => choose(null),
   };
   byId("canvas").addEventListener("keydown", (event) => {
     const action = event.ctrlKey || event.metaKey || event.altKey ? undefined : KEYS[event.key];
@@ -385,6 +458,35 @@
     filterRows();
   });
 
+  // -- enclaves to choose from ---------------------------------------------------------------------------------------
+
+  const tables = [...document.querySelectorAll("details.enclave")];
+  const choosers = [...document.querySelectorAll("#enclaves button")];
+
+  function showEnclave(number) {
+    tables.forEach((each) => { each.open = each.dataset.enclave === number; });
+    choosers.forEach((each) => each.setAttribute("aria-current", String(each.dataset.enclave === number)));
+  }
+  for (const button of choosers) {
+    button.addEventListener("click", () => {
+      showEnclave(button.dataset.enclave);
+      choose(`e${button.dataset.enclave}`, true);
+      tables[Number(button.dataset.enclave)].scrollIntoView({ block: "nearest" });
+    });
+  }
+  if (choosers.length) choosers[0].setAttribute("aria-current", "true");
+
   draw();
+  // Of a large launch the busiest enclave is shown with its neighbours, so that its names can be read.
+  if (graph.zoom() < READABLE && enclaves.length > 1) {
+    const weight = (enclave) => members.filter((each) => each.enclave === enclave.name)
+      .reduce((sum, each) => sum + each.uses.filter((use) => !use.builtIn).length, 0);
+    const busiest = enclaves.reduce((best, each) => (weight(each) > weight(best) ? each : best));
+    byId("only-near").checked = true;
+    choose(busiest.id);
+    proposed = busiest.id;
+    byId("status").textContent += `. Shown: ${busiest.name} and its neighbours; choose another one in the list`;
+  }
+  window.addEventListener("resize", () => fit());
   document.documentElement.dataset.ready = "true";
 })();

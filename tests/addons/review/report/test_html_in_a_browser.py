@@ -8,7 +8,7 @@ import pytest
 
 from enclave_addons.review.html.page import html_report
 from enclave_launch import DryRun
-from tests.addons.review.report.browser import Page
+from tests.addons.review.report.browser import Page, browser, chromium
 from tests.addons.review.report.conftest import HOSTILE, contents, hostile, large, robot
 
 GRAPH = "document.getElementById('canvas')._cyreg.cy"
@@ -283,7 +283,7 @@ def test_five_hundred_nodes_are_drawn_and_searched(page: Page, tmp_path: Path) -
     assert page.run(f"{GRAPH}.nodes('.node').length") == 500
     type_into(page, "search", "area_3/node_171")
     assert listed(page) == ["/area_3/node_171 (node)"]
-    click(page, "#only-near")
+    assert page.run("document.getElementById('only-near').checked"), "names of so many cannot be read at once"
     assert drawn(page) == {
         "/area_3/node_171", "/area_3/out_171", "/area_3/state_171", "/area_3/out_170", "/area_3/state_164",
         "/area_0/state_21",
@@ -292,3 +292,33 @@ def test_five_hundred_nodes_are_drawn_and_searched(page: Page, tmp_path: Path) -
     click(page, "#only-near")
     assert page.run(f"{GRAPH}.nodes('.node:visible').length") == 500
     assert page.told == []
+
+
+@pytest.mark.parametrize("width", [390, 1024, 1600])
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_sticks_out_or_overlaps_at_any_width(tmp_path: Path, width: int, dark: bool) -> None:
+    if chromium() is None:
+        pytest.skip("no Chromium")
+    file = tmp_path / "report.html"
+    file.write_text(html_report(contents(robot())))
+    with browser(width=width, height=900, dark=dark) as page:
+        page.open(file)
+        assert page.run("document.documentElement.scrollWidth") <= width
+        overlap = (
+            "(() => { const [a, b] = ['h1', '#theme'].map(s => document.querySelector(s).getBoundingClientRect());"
+            " return a.right > b.left && a.bottom > b.top && a.left < b.right && a.top < b.bottom; })()"
+        )
+        assert page.run(overlap) is False
+        assert page.run("document.getElementById('canvas').clientWidth") > 0.9 * width - 60
+        assert page.run(f"{GRAPH}.zoom()") > 0.3 and page.told == []
+
+
+def test_an_enclave_is_chosen_in_the_list_and_shown_alone(page: Page, tmp_path: Path) -> None:
+    opened(page, tmp_path, robot())
+    names = page.run("[...document.querySelectorAll('#enclaves button code')].map(b => b.textContent)")
+    assert len(names) == 4
+    page.run("document.querySelectorAll('#enclaves button')[2].click()")
+    visible = "filter(each => each.checkVisibility()).map(each => each.dataset.enclave)"
+    shown = f"[...document.querySelectorAll('details.enclave')].{visible}"
+    assert page.run(shown) == ["2"]
+    assert names[2] in detail(page)
