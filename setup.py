@@ -54,7 +54,7 @@ ENTRY_POINTS = {
     ],
     "secure_keystore.verb": [
         "export = enclave_addons.deployment.keystore_verb.export",
-        "import = enclave_addons.deployment.keystore_verb.import",
+        "import = enclave_addons.deployment.keystore_verb.import_bundle",
         "units = enclave_addons.deployment.keystore_verb.units",
         "request = enclave_addons.deployment.keystore_verb.request",
         "sign = enclave_addons.deployment.keystore_verb.sign",

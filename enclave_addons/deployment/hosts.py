@@ -56,7 +56,9 @@ class NodeNeeds(Needs, frozen=True):
     nodes: list[StrictStr]
 
 
-class _Document(StrictDocument, frozen=True):
+class HostsDocument(StrictDocument, frozen=True):
+    """Content of a hosts file."""
+
     hosts: dict[StrictStr, HostPatterns] = Field(default_factory=dict)
     needs: list[NodeNeeds] = Field(default_factory=list)
 
@@ -117,7 +119,7 @@ def load_hosts(path: Path) -> Hosts:
 
 def parse_hosts(text: bytes, where: str) -> Hosts:
     """Return what ``load_hosts`` returns, from the file's content."""
-    document = parse_given(_Document, text, where)
+    document = parse_given(HostsDocument, text, where)
     for name in document.hosts:
         refuse_host_name(name, where)
     for needs in document.needs:
