@@ -33,6 +33,7 @@ from keystore.disk.signed_documents import own_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.compact import expanded
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -155,7 +156,8 @@ def _subject(
     if permissions.subject != subject_name(name):
         raise DamagedKeystoreError(f"{printable(view.root / place)} is not for {subject_name(name)}")
     types = types_of_shares(enclave, read_shares(view.root, enclave)) if register is not None else {}
-    grants = grants_of_topics(permissions.rules.allow, permissions.rules.deny, types)
+    rules = expanded(permissions.rules)
+    grants = grants_of_topics(rules.allow, rules.deny, types)
     return Subject(enclave, name, access_rules(enclave, grants, permissions.domains)), grants.gaps
 
 

@@ -258,17 +258,20 @@ class KeystoreSettings:
     """The settings that a keystore keeps in ``secure-keystore.json``; keystores made by SROS2 have the defaults.
 
     The file also marks a directory as a keystore in the making, so that an interrupted ``create`` can be completed
-    while a foreign directory is left alone. ``lifetime`` is for new certificates of enclaves.
+    while a foreign directory is left alone. ``lifetime`` is for new certificates of enclaves. ``compact``: permissions
+    name the parameter services of a node by one expression (``keystore.formats.compact``).
     """
 
     subjects: SubjectScheme = SubjectScheme.EXACT
     lifetime: timedelta = DEFAULT_LIFETIME
+    compact: bool = False
 
     def to_json(self) -> bytes:
         content = {
             "version": _VERSION,
             "subjects": self.subjects.value,
             "lifetime_seconds": int(self.lifetime.total_seconds()),
+            **({"compact": True} if self.compact else {}),
         }
         return json.dumps(content, indent=2, sort_keys=True).encode() + b"\n"
 
@@ -282,6 +285,7 @@ class KeystoreSettings:
             return cls(
                 SubjectScheme(content["subjects"]),
                 timedelta(seconds=int(content["lifetime_seconds"])),
+                content.get("compact", False) is True,
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             raise DamagedKeystoreError(

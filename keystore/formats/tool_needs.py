@@ -14,6 +14,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from keystore.errors import InvalidInputError, printable
+from keystore.formats.compact import PARAMETER_SERVICES
 from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
@@ -55,14 +56,6 @@ _P, _S, _R, _Q, _C = (
     Operation.REPLY,
     Operation.REQUEST,
     Operation.CALL,
-)
-PARAMETER_SERVICES = (
-    "describe_parameters",
-    "get_parameter_types",
-    "get_parameters",
-    "list_parameters",
-    "set_parameters",
-    "set_parameters_atomically",
 )
 _LIFECYCLE_SERVICES = (
     "change_state",

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime, timedelta
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,14 +20,27 @@ from keystore.disk.register_file import needs_register, read_register, refuse_fo
 from keystore.disk.safe_files import refuse_foreign_owner, resolve_root
 from keystore.disk.signed_documents import governance_domains, governance_stands
 from keystore.disk.view import KeystoreView
-from keystore.errors import SigningUnavailableError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, SigningUnavailableError, printable
+from keystore.formats.compact import (
+    PATTERN,
+    compact_nodes,
+    compacted,
+    compacted_like,
+    expanded,
+    is_overtaken,
+    topics_of,
+    written_out,
+)
 from keystore.formats.domains import Domains
-from keystore.formats.permissions import permissions_document
+from keystore.formats.permissions import Permissions, permissions_document
+from keystore.formats.permissions_document import parse_permissions
+from keystore.formats.permissions_patterns import Expressions
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.shares import Share
 from keystore.formats.validity import Validity, iso, later, utc_now
+from keystore.signing import smime
 from keystore.steps.enclave_state import (
     OTHER_PERMISSIONS,
     EnclaveState,
@@ -70,6 +87,101 @@ def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions)
     mine = Share(options.launch.owner, domains, policy.profiles, types)
     share = EnclaveShare(root, policy.path, mine.owner, mine, options.launch)
     return WantedEnclave(share.document, share=share, ends_by=ends_by)
+
+
+def wanted_enclaves(
+    root: Path, policies: Iterable[EnclavePolicy], options: ProvisionOptions
+) -> dict[str, WantedEnclave]:
+    """Return the enclaves with exactly these policies, and with compact permissions those that must change with them.
+
+    Where the CA keys are, the keystore's settings decide. A host takes the form that was signed for it.
+    """
+    given = {policy.path: policy for policy in policies}
+    wanted = {path: wanted_enclave(root, policy, options) for path, policy in given.items()}
+    view = KeystoreView(root)
+    if not view.is_complete:
+        return wanted
+    if view.key_file(Role.PERMISSIONS) is None:
+        return _as_signed(view, wanted, given, options)
+    if not _is_compact(view):
+        return wanted
+    whole = {path: _whole(one, given[path]) for path, one in wanted.items()}
+    signed = {path: _signed_topics(view, path) for path in view.enclaves() if path not in wanted}
+    named = (*map(written_out, signed.values()), *map(topics_of, whole.values()))
+    known = Expressions(chain(*named))
+    for path, policy in whole.items():
+        wanted[path] = _shortened(wanted[path], policy, options, partial(compacted, known=known))
+    for path in signed:
+        if is_overtaken(signed[path], known):
+            wanted[path] = WantedEnclave(_written_out(view, path, known))
+    return wanted
+
+
+def _as_signed(
+    view: KeystoreView,
+    wanted: Mapping[str, WantedEnclave],
+    given: Mapping[str, EnclavePolicy],
+    options: ProvisionOptions,
+) -> dict[str, WantedEnclave]:
+    found = dict(wanted)
+    for path, one in wanted.items():
+        present = _signed_topics(view, path) if _may_be_compact(view, path) else frozenset[str]()
+        if compact_nodes(present):
+            found[path] = _shortened(
+                one, _whole(one, given[path]), options, partial(compacted_like, present=present)
+            )
+    return found
+
+
+def _is_compact(view: KeystoreView) -> bool:
+    with suppress(DamagedKeystoreError):  # whoever writes next restores the settings
+        return view.settings.compact
+    return False
+
+
+def _whole(wanted: WantedEnclave, policy: EnclavePolicy) -> EnclavePolicy:
+    return policy if wanted.share is None else wanted.share.policy
+
+
+def _may_be_compact(view: KeystoreView, enclave: str) -> bool:
+    """Return whether the text of signed permissions has such an expression; they are parsed only if it has."""
+    return PATTERN.encode() in (view.enclave_file(enclave, layout.PERMISSIONS) or b"")
+
+
+def _shortened(
+    wanted: WantedEnclave,
+    policy: EnclavePolicy,
+    options: ProvisionOptions,
+    shortened: Callable[[EnclavePolicy], EnclavePolicy],
+) -> WantedEnclave:
+    if wanted.share is not None:
+        share = replace(wanted.share, shortened=shortened)
+        return wanted._replace(permissions=share.document, share=share)
+    return wanted._replace(permissions=permissions_source(shortened(policy), options))
+
+
+def _signed_topics(view: KeystoreView, enclave: str) -> frozenset[str]:
+    """Return the topics that signed permissions allow; none for what cannot be read, which is signed again."""
+    with suppress(KeystoreError):
+        allow = _signed(view, enclave).rules.allow
+        return frozenset((*allow.publish, *allow.subscribe))
+    return frozenset()
+
+
+def _signed(view: KeystoreView, enclave: str) -> Permissions:
+    place = layout.enclave_file(enclave, layout.PERMISSIONS)
+    return parse_permissions(
+        smime.read(view.enclave_file(enclave, layout.PERMISSIONS) or b"", place).document, place
+    )
+
+
+def _written_out(view: KeystoreView, enclave: str, known: Expressions) -> PermissionsSource:
+    """Return what makes the document of an enclave again, without expressions that cover other known topics."""
+    found = _signed(view, enclave)
+    rules = expanded(found.rules, known)
+    return lambda subject, validity: found._replace(
+        subject=subject, validity=validity, rules=rules
+    ).document()
 
 
 def compare(
@@ -129,7 +241,7 @@ def differences(
     refuse_foreign_owner(root, [policy.path])
     register = read_register(root)
     refuse_foreign_authorities(view, register)
-    wanted = wanted_enclave(root, policy, chosen)
+    wanted = wanted_enclaves(root, [policy], chosen)[policy.path]
     state = inspect_wanted(view, register, policy.path, wanted, chosen, now)
     reasons = [] if state.is_good else [*state.reasons]
     if not governance_stands(view, chosen.domains, register):

@@ -59,10 +59,12 @@ class CreateOptions(ChangeOptions):
     imported: Mapping[Role, ImportedCa] = field(default_factory=dict)
     encrypt_ca_keys: bool = False
     """Make no CA key without ``access.passphrase``, which encrypts new ones whenever it is given."""
+    compact: bool | None = None
+    """Whether permissions are compact; ``None`` leaves an existing keystore as it is."""
 
     @property
     def settings(self) -> KeystoreSettings:
-        return KeystoreSettings(self.subjects, self.lifetime)
+        return KeystoreSettings(self.subjects, self.lifetime, self.compact is True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +130,9 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
                 actions.append("kept out of git by its .gitignore, since it holds keys")
         for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
             opened.ensure_directory(directory)
+    if _change_compact(opened, options):
+        what = "compact" if options.compact else "written out"
+        actions.append(f"permissions are {what} from the next launch or apply-policy on")
     for role in Role:
         if _restore_ca(opened, role):
             actions.append(f"{role.label} restored from the register")
@@ -149,6 +154,18 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
     with opened.batch() as batch:
         batch.record(replace(opened.register, settings=options.settings.to_json()))
         batch.file(layout.SETTINGS, options.settings.to_json())
+    return True
+
+
+def _change_compact(opened: Store, options: CreateOptions) -> bool:
+    """Record whether permissions are to be compact, in a keystore that has it otherwise. Returns whether it was."""
+    present = KeystoreView(opened.root).settings
+    if options.compact is None or present.compact is options.compact:
+        return False
+    settings = replace(present, compact=options.compact).to_json()
+    with opened.batch() as batch:
+        batch.record(replace(opened.register, settings=settings))
+        batch.file(layout.SETTINGS, settings)
     return True
 
 

@@ -282,7 +282,8 @@ class EnclaveWriter:
         if len(signed) >= WARN_BYTES:
             self.warnings.append(
                 f"the permissions of enclave {enclave} take {len(signed)} bytes; Fast DDS carries "
-                f"at most {FAST_DDS_LIMIT_BYTES}, beyond that its peers never match: split the enclave"
+                f"at most {FAST_DDS_LIMIT_BYTES}, beyond that its peers never match: secure-keystore create KEYSTORE "
+                "--compact, or split the enclave"
             )
         entries[layout.PERMISSIONS_XML] = Content(document)
         entries[layout.PERMISSIONS] = Content(signed)

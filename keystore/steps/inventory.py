@@ -12,6 +12,7 @@ from keystore.disk import layout
 from keystore.disk.signed_documents import governance_in_force
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.formats.certificate import CertificateFacts
+from keystore.formats.compact import expanded
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, TopicRule
 from keystore.formats.permissions_document import granted_rules, parse_permissions
@@ -130,7 +131,8 @@ def _plain(value: Any) -> Any:
 def granted(keystore: Path | str) -> dict[str, frozenset[Rule]]:
     """Map enclaves to the rules that their permissions allow, with final names; one without permissions is left out.
 
-    What they deny is not taken off. No ROS rule explains a name without a slash before it: it is a topic of DDS.
+    Compact permissions are written out. What they deny is not taken off.
+    No ROS rule explains a name without a slash before it: it is a topic of DDS.
 
     Raises ``NotAKeystoreError``, ``DamagedKeystoreError``, and ``InvalidInputError`` for files that cannot be read.
     """
@@ -140,7 +142,6 @@ def granted(keystore: Path | str) -> dict[str, frozenset[Rule]]:
         signed = view.enclave_file(enclave, layout.PERMISSIONS)
         if signed is not None:
             place = layout.enclave_file(enclave, layout.PERMISSIONS)
-            found[enclave] = frozenset(
-                granted_rules(parse_permissions(smime.read(signed, place).document, place))
-            )
+            permissions = parse_permissions(smime.read(signed, place).document, place)
+            found[enclave] = frozenset(granted_rules(permissions._replace(rules=expanded(permissions.rules))))
     return found

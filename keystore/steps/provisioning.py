@@ -39,7 +39,7 @@ from keystore.steps.comparison import (
     inspect_wanted,
     permissions_source,
     refuse_without_keys,
-    wanted_enclave,
+    wanted_enclaves,
     with_domains,
 )
 from keystore.steps.creation import CreateOptions, complete
@@ -73,7 +73,7 @@ def provision(
     if chosen.signing is not None:
         report = chosen.signing.provision(policies, chosen)
     else:
-        wanted = {policy.path: wanted_enclave(root, policy, chosen) for policy in policies}
+        wanted = wanted_enclaves(root, policies, chosen)
         report = bring_about(root, wanted, chosen)
     if chosen.launch is not None:
         chosen.launch.take()  # a new keystore had no place for it before

@@ -8,7 +8,7 @@ that is taken away.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +28,10 @@ from keystore.formats.shares import Share, is_part_of, merged_profiles, shares_j
 from keystore.formats.validity import Validity
 
 
+def _as_it_is(policy: EnclavePolicy) -> EnclavePolicy:
+    return policy
+
+
 @dataclass(frozen=True)
 class EnclaveShare:
     """The share of ``owner`` in one enclave, with those of others as they stand when they are first read.
@@ -40,12 +44,18 @@ class EnclaveShare:
     owner: str
     mine: Share | None
     hold: LaunchHold | None = None
+    shortened: Callable[[EnclavePolicy], EnclavePolicy] = _as_it_is
+    """What is signed in the place of all shares together: the same, or with compact permissions."""
+
+    @property
+    def policy(self) -> EnclavePolicy:
+        """Return all shares together; raises InvalidInputError if they cannot be united."""
+        return united(self.enclave, self.shares)
 
     def document(self, subject: str, validity: Validity) -> bytes:
         """Unite the permissions of all shares; raises InvalidInputError if they cannot be united."""
         domains = united_domains(self.shares) if self.shares else governance_domains(KeystoreView(self.root))
-        policy = united(self.enclave, self.shares)
-        return permissions_document(subject, policy, validity=validity, domains=domains)
+        return permissions_document(subject, self.shortened(self.policy), validity=validity, domains=domains)
 
     @cached_property
     def present(self) -> tuple[Share, ...]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_common.command_line import PATH, TEXT
+from enclave_common.command_line import FLAG, PATH, TEXT
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.governance_yaml import governance_of
@@ -37,6 +37,10 @@ OPTIONS: common.Table = (
     ("--external-identity-ca CERT", PATH,
      "certificates come from this CA (Vault, step-ca ...), by secure-keystore request and sign --issued"),
     common.ENCRYPTION,
+    ("--compact", FLAG,
+     "permissions name the parameter services of a node by one expression where no other node lies below it: Fast DDS "
+     "carries 63,736 bytes; also for a keystore that exists"),
+    ("--no-compact", FLAG, "take --compact back"),
     *common.SUBJECTS,
     *common.CHANGE,
 )  # fmt: skip
@@ -64,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         names={role: given[f"{role.value}_name"] for role in Role if given[f"{role.value}_name"]},
         imported=imported,
         encrypt_ca_keys=arguments.encrypt_ca_keys,
+        compact=_compact(arguments),
         **common.change(arguments),
     )
     report = create_keystore(arguments.keystore, options)
@@ -71,3 +76,9 @@ def run(arguments: argparse.Namespace) -> int:
         common.print_lines(report.actions or ("the keystore is complete already, nothing was changed",))
     common.warn(report.warnings, arguments)
     return 0
+
+
+def _compact(arguments: argparse.Namespace) -> bool | None:
+    if arguments.compact and arguments.no_compact:
+        raise InvalidInputError("--compact and --no-compact contradict each other; leave out one")
+    return True if arguments.compact else False if arguments.no_compact else None

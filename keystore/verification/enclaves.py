@@ -10,7 +10,7 @@ from datetime import datetime
 
 from cryptography import x509
 
-from enclave_common.words import counted
+from enclave_common.words import counted, some_of
 from keystore.disk import layout, safe_files
 from keystore.disk.register_file import needs_register
 from keystore.disk.signed_documents import foreign_document, governance_in_force
@@ -23,6 +23,7 @@ from keystore.errors import (
     printable,
 )
 from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, read_certificate
+from keystore.formats.compact import compact_nodes
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import DdsRules, Permissions, TopicSets
 from keystore.formats.permissions_document import parse_permissions
@@ -295,7 +296,14 @@ class _EnclaveCheck:
         if len(p7s) >= WARN_BYTES:
             severity = Severity.ERROR if len(p7s) > FAST_DDS_LIMIT_BYTES else Severity.WARNING
             text = f"{len(p7s)} bytes; Fast DDS carries at most {FAST_DDS_LIMIT_BYTES}"
-            yield self._finding(severity, "too-large", layout.PERMISSIONS, text, "split the enclave")
+            fix = repair.run(
+                self._view.root, "create", "--compact", note="then apply-policy or a launch; or split it"
+            )
+            if self._view.key_file(Role.PERMISSIONS) is None:
+                fix = repair.renew(self._view.root, self._enclave)
+            elif compact_nodes(permissions.rules.allow.publish):
+                fix = "split the enclave: give some of its nodes their own (enclave=)"
+            yield self._finding(severity, "too-large", layout.PERMISSIONS, text, fix)
 
     def _foreign(self, error: OtherFormError) -> Finding:
         """Report what is not as we write it: to be taken over where another tool made the keystore, else distrusted."""
@@ -338,6 +346,8 @@ class _EnclaveCheck:
         text = f"grants by wildcard (* also matches /): {shown}" + "".join(
             f"; it may {one}" for one in opened
         )
+        if compact := compact_nodes(rules.allow.publish):
+            text += f"; compact: the parameter services of {some_of(compact, 4)}"
         yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, text)
 
     def _validity(self, permissions: Validity, certificate: Validity) -> Iterator[Finding]:

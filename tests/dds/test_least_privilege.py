@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import keystore
 from enclave_launch import ResolveOptions, SecurityOptions, resolve
 from enclave_launch import provision as provision_launch
 from keystore import Domains, EnclavePolicy, Operation, Profile, ProvisionOptions, Qualifier, Rule
@@ -184,3 +185,26 @@ def test_launch_files_become_exactly_their_permissions(
         provision_launch(plan, tmp_path / "ks", options=security)
     together = {enclave: names for expected in LAUNCHES.values() for enclave, names in expected.items()}
     check(dds, domain_id, tmp_path / "ks", together)
+
+
+def test_compact_permissions_serve_the_parameters_of_their_node_and_of_no_other(
+    dds: Probe, domain_id: int, tmp_path: Path
+) -> None:
+    root = tmp_path / "ks"
+    keystore.create_keystore(root, keystore.CreateOptions(durable=False, compact=True))
+    provision(root, domain_id, [EnclavePolicy("/cam", (node("/ns", "cam"),))])
+    document = (root / "enclaves/cam/permissions.xml").read_text()
+    assert "rr/ns/cam/*_parameter*Reply" in document and "get_parameters" not in document
+    own = [f"/ns/cam/{service}" for service in PARAMETER_SERVICES]
+    others = [f"{name}/get_parameters" for name in ("/ns/cam2", "/ns", "/cam", "/x/ns/cam")] + [
+        "/ns/cam/get_type_description",
+        "/ns/cam/reset",
+    ]
+    publish = tuple(f"rr{name}Reply" for name in (*own, *others))
+    subscribe = tuple(f"rq{name}Request" for name in (*own, *others))
+    cam = Participant("cam", root / "enclaves/cam", publish=publish, subscribe=subscribe)
+    answers = dds.try_endpoints(domain_id, [cam])
+    for name in (*own, *others):
+        expected = name in own
+        assert answers.may("cam", "publish", f"rr{name}Reply") is expected, name
+        assert answers.may("cam", "subscribe", f"rq{name}Request") is expected, name
