@@ -20,7 +20,14 @@ VERSION = "0.1.0"
 REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "asn1crypto>=1.4", "pydantic>=1.8"]
 PACKAGE_DATA = {
     "enclave_common": ["py.typed"],
-    "enclave_launch": ["py.typed", "__init__.pyi"],
+    "enclave_launch": [
+        "py.typed",
+        "__init__.pyi",
+        "demo/lib/demo_nodes/*",
+        "demo/share/*/*.xml",
+        "demo/share/*/launch/*",
+        "demo/share/ament_index/*/*/*",
+    ],
     "nodl": ["py.typed", "schemas/*", "document/common/*/*"],
     "enclave_addons": [
         "py.typed",
@@ -48,6 +55,7 @@ ENTRY_POINTS = {
         "inference = enclave_addons.inference.describer:SourceInference",
     ],
     "enclave_launch.companion": ["recording = enclave_addons.recording.denials:explaining"],
+    "keystore.planned_topics": ["launch = enclave_launch.verb.planning:planned_topics"],
     "secure_launch.mode": [
         "observation = enclave_addons.observation.mode",
         "recording = enclave_addons.recording.mode",
@@ -59,6 +67,7 @@ ENTRY_POINTS = {
         "request = enclave_addons.deployment.keystore_verb.request",
         "sign = enclave_addons.deployment.keystore_verb.sign",
         "fleet = enclave_addons.deployment.keystore_verb.fleet",
+        "why = enclave_addons.deployment.keystore_verb.why",
         "zenoh = enclave_addons.zenoh.verb.zenoh",
     ],
     "secure_nodl.verb": [

@@ -148,6 +148,7 @@ class CommandParser(argparse.ArgumentParser):
         texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
         form = {"allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter}
         super().__init__(**{**form, **settings, **texts})
+        self.color = False  # Python 3.14 colours help by itself, with codes that terminal.py would escape
 
     def show_first(self, daily: Iterable[str], everything: Callable[[], CommandParser]) -> None:
         """Let the help show only what is used daily, and add ``--help-all``. To be called before anything is added.

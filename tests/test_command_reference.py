@@ -1,5 +1,6 @@
 """docs/commands.md and the man pages say what the parsers say."""
 
+import re
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -34,3 +35,10 @@ def test_each_verb_has_its_heading() -> None:
     verbs = ("secure-plan diff", "secure-keystore verify", "secure-nodl infer")
     for heading in ("## secure-launch", *(f"### {verb}" for verb in verbs), "#### secure-nodl library check"):
         assert f"\n{heading}\n" in text
+
+
+def test_the_index_by_task_leads_to_headings() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    headings = {line.lstrip("# ").replace(" ", "-") for line in text.splitlines() if line.startswith("#")}
+    targets = set(re.findall(r"\(#([a-z-]+)\)", text))
+    assert len(targets) > 30 and targets <= headings

@@ -116,7 +116,10 @@ LOOKING: tuple[Option, ...] = (
      "why each permission is there: manifest, remap rule or built-in, with file and line"),
     ("--dump-params", FLAG, "print every node's parameters as one YAML file"),
 )  # fmt: skip
+DEMO = Path(__file__).parents[1] / "demo"
+"""A workspace that comes with the package, for a first look."""
 WRITTEN: tuple[Option, ...] = (
+    ("--demo", FLAG, "look at a launch file that comes with this program: secure-launch --dry-run --demo"),
     ("-s --show-args --show-arguments", FLAG, "print the launch arguments that the file declares"),
     ("-p --print --print-description", {**FLAG, "dest": "print_description"}, "print the launch description"),
 )

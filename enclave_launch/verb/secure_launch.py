@@ -42,7 +42,7 @@ from enclave_launch.report.tree import plan_tree
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings
 from enclave_launch.verb.modes import check_modes
-from enclave_launch.verb.options import build_parser, resolve_options
+from enclave_launch.verb.options import DEMO, build_parser, resolve_options
 from enclave_launch.verb.planning import planned
 from enclave_launch.verb.target import LaunchTarget, find_target, launch_folder
 from enclave_launch.verb.usage import (
@@ -82,6 +82,8 @@ def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None
 
 def _main(line: CommandLine) -> int:
     check_options(line, line.actions)
+    if line.options.demo:
+        _take_demo(line.options)
     prefixes = search_prefixes(line.options.prefix)
     options = with_project(line, find_project(launch_folder(line.options.words, prefixes), Path()))
     if options.verbose:
@@ -103,6 +105,18 @@ def _main(line: CommandLine) -> int:
     from enclave_launch.verb.start import launch_target  # asyncio, cryptography
 
     return launch_target(target, options, keystore)
+
+
+def _take_demo(options: argparse.Namespace) -> None:
+    """Let the options name the launch file of the package; raises UsageError for a start or another launch file."""
+    if (
+        not (options.dry_run or options.explain or options.show_args or options.print_description)
+        or options.words
+    ):
+        raise UsageError(
+            "--demo has a launch file of its own, to look at\ntry: secure-launch --dry-run --demo"
+        )
+    options.prefix, options.words = [DEMO], ["demo_nodes", "demo.launch.xml"]
 
 
 def _keystore(options: argparse.Namespace) -> str | None:

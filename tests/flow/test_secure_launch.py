@@ -277,3 +277,10 @@ def test_provisioning_alone_needs_secure_and_nothing_that_looks(
     run = secure_launch(*words, *(("--keystore", tmp_path / "ks") if "--secure" in words else ()), file)
     assert run.returncode == 2 and "--provision-only" in run.stderr
     assert not (tmp_path / "ks").exists()
+
+
+def test_the_demo_of_the_package_is_shown_and_never_started(secure_launch: SecureLaunch) -> None:
+    shown = secure_launch("--dry-run", "--demo")
+    assert shown.returncode == 0 and "enclave /speaker" in shown.stdout and "/conversation" in shown.stdout
+    for words in (["--demo"], ["--dry-run", "--demo", "other.launch.xml"]):
+        assert secure_launch(*words).returncode == 2

@@ -62,7 +62,8 @@ def build_parser(*, first: bool = False) -> CommandParser:
         for title, options in module.OPTIONS.items():
             verb.add_options(options, title)
         if getattr(module, "PLANS", True):
-            verb.add_options(RESOLVING)
+            own = {option for table in module.OPTIONS.values() for option, *_ in table}
+            verb.add_options(row for row in RESOLVING if row[0].split()[0] not in own)
             verb.fold(RESOLVING, "secure-launch --help-all")
             # A launch prefix is only of use where something is started.
             verb.set_defaults(launch_prefix=None, launch_prefix_filter=None)

@@ -22,14 +22,16 @@ from enclave_addons.review.installation import (
     look_at_middleware,
     sourced_distribution,
 )
+from enclave_addons.review.verb import plans
 from enclave_addons.review.verb.plans import FORM, read_plan
-from enclave_common.command_line import PATH, TEXT, FromProject
+from enclave_common.command_line import FLAG, PATH, TEXT, FromProject, Option
 from enclave_common.terminal import json_text, printable_lines
 from enclave_common.words import counted, some_of
 from enclave_launch.admission.middleware import ZENOH, middleware_of, vendor_of
 from enclave_launch.diagnostics import Code
 from enclave_launch.dry_run import Diagnostic, DryRun
 from enclave_launch.errors import EnclaveLaunchError, UsageError
+from enclave_launch.ros_rules.distro import choose_release, list_versions
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import KeystoreError, SigningUnavailableError, WrongClockError
 from keystore.formats.role import Role
@@ -38,8 +40,11 @@ from keystore.signing.ca_access import CaAccess, Secret
 from keystore.verification import verify
 from nodl.ament_index import search_prefixes
 
+WORDS: tuple[Option, ...] = (("words", {**plans.WORDS, "nargs": "*"}, "a plan or what to plan"),)
 OPTIONS = {
     "": (
+        ("--versions", {**FLAG, "dest": "lists_versions"},
+         "only print the versions of the installed packages of ROS, for --versions FILE elsewhere"),
         ("--keystore DIR", {**PATH, "configured": FromProject("keystore")},
          "the keystore of the start (default: ROS_SECURITY_KEYSTORE, or keystore in enclaves.yaml)"),
         ("--ca-passphrase-file FILE", PATH, "passphrase of encrypted CA keys"),
@@ -73,6 +78,13 @@ class LookedAt:
 
 def run(options: argparse.Namespace) -> int:
     """Print what is there and what is missing. Returns 1 if something is missing."""
+    options.versions = None  # of the robot: here the installed ones count
+    if options.lists_versions:
+        return _print_versions(options)
+    if not options.words:
+        raise UsageError(
+            "give PACKAGE LAUNCH_FILE, or the PATH of a launch file\ntry: secure-plan doctor PACKAGE LAUNCH_FILE"
+        )
     answers = list(_answers(options))
     missing = [each for each in answers if each.state == MISSING]
     if options.format == "json":
@@ -85,6 +97,18 @@ def run(options: argparse.Namespace) -> int:
                 print(printable_lines(f"        try: {each.step}"))
         print(_verdict(len(missing)))
     return 1 if missing else 0
+
+
+def _print_versions(options: argparse.Namespace) -> int:
+    release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes(options.prefix))
+    listed = list_versions(release)
+    if not listed:
+        raise UsageError(
+            "no package of ROS whose version matters is installed or sourced here\n"
+            "try: . /opt/ros/DISTRO/setup.sh, or name its install prefix with --prefix DIR"
+        )
+    sys.stdout.write(listed)
+    return 0
 
 
 def _verdict(missing: int) -> str:
@@ -138,9 +162,16 @@ def _ros(plan: DryRun | None, prefixes: tuple[str, ...]) -> Iterator[LookedAt]:
         assumed = (
             f"; assumed, as not installed: {', '.join(plan.release.assumed)}" if plan.release.assumed else ""
         )
-        step = "--distro NAME@DATE names the robot's, as in jazzy@2025-03" if assumed else ""
+        step = (
+            "secure-plan doctor --versions > robot.versions on the robot, then --versions robot.versions here"
+            if assumed
+            else ""
+        )
         yield LookedAt(
-            NOTE if assumed else OK, "versions", f"{plan.release.distro}: {versions}{assumed}", step
+            NOTE if assumed else OK,
+            "versions",
+            f"{plan.release.distro}: {versions}{assumed}",
+            step if assumed else "",
         )
 
 

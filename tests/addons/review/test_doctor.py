@@ -104,3 +104,22 @@ def test_a_middleware_whose_dds_was_built_without_security_is_told_from_one_with
     assert (found.version, found.security) == ("1.2.3", None)
     library.write_bytes(b"...DDS:Auth:PKI-DH:1.0...")
     assert look_at_middleware("rmw_fastrtps_cpp", [str(tmp_path)]).security == str(library)
+
+
+def test_the_versions_of_a_machine_are_printed_for_another(
+    capsys: pytest.CaptureFixture[str], here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert secure_plan(["doctor", "--versions"]) == 2
+    assert "\ntry: . /opt/ros/" in capsys.readouterr().err
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    for name in ("launch", "launch_ros", "rcl"):
+        installed(here / "opt", name)
+    for name, version in (("launch", "3.4.5"), ("launch_ros", "0.26.7"), ("rcl", "9.2.5")):
+        package = here / "opt" / "share" / name / "package.xml"
+        package.write_text(package.read_text().replace("1.2.3", version))
+    assert secure_plan(["doctor", "--versions", "--prefix", "opt"]) == 0
+    listed = capsys.readouterr().out
+    assert "ros-jazzy-launch 3.4.5\n" in listed
+    Path("robot.versions").write_text(listed)
+    assert secure_plan(["show", "--format", "json", "--versions", "robot.versions", *LAUNCH]) == 0
+    assert '"launch": "3.4.5"' in capsys.readouterr().out

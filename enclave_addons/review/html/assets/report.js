@@ -298,10 +298,15 @@
     mark(isSearching());
     const drawn = graph.getElementById(id || "");
     drawn.select();
-    if (centre && drawn.nonempty() && !regrouped) {
+    if (centre && drawn.nonempty() && !regrouped && !inSight(drawn)) {
       graph.zoom(Math.max(graph.zoom(), 0.7));
       graph.center(drawn);
     }
+  }
+
+  function inSight(drawn) {
+    const box = drawn.renderedBoundingBox();
+    return graph.zoom() >= READABLE && box.x1 >= 0 && box.y1 >= 0 && box.x2 <= graph.width() && box.y2 <= graph.height();
   }
 
   function paragraph(text) {
