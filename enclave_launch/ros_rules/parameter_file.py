@@ -72,20 +72,29 @@ def parts_of(text: str) -> Iterator[tuple[str, str, str, int]]:
 
     The style of a scalar that is tagged as text, and stands without quotes, is its tag.
     """
-    event: Any
+    loader = LIBYAML_LOADER(text)
+    next_event, kind_of = loader.get_event, _KINDS.get
     depth = 0
-    for event in yaml.parse(text, Loader=LIBYAML_LOADER):
-        kind = _KINDS.get(type(event))
-        if kind == "scalar":
-            style = event.tag if event.tag == _TEXT_TAG and event.style not in _QUOTES else event.style
-            yield kind, event.value, style, event.start_mark.line + 1
-        elif kind:
-            depth += (kind in _BEGINS) - (kind in _ENDS)
-            if depth > MAX_NESTING:
-                raise RefusedParameters(
-                    f"line {event.start_mark.line + 1}: nested more than {MAX_NESTING} deep"
-                )
-            yield kind, "", "", event.start_mark.line + 1
+    try:
+        while True:  # until the end of the stream, which each text has
+            event: Any = next_event()
+            kind = kind_of(type(event))
+            if kind == "scalar":
+                tag, style = event.tag, event.style
+                if tag is not None and tag == _TEXT_TAG and style not in _QUOTES:
+                    style = tag
+                yield kind, event.value, style, event.start_mark.line + 1
+            elif kind:
+                depth += (kind in _BEGINS) - (kind in _ENDS)
+                if depth > MAX_NESTING:
+                    raise RefusedParameters(
+                        f"line {event.start_mark.line + 1}: nested more than {MAX_NESTING} deep"
+                    )
+                yield kind, "", "", event.start_mark.line + 1
+            elif type(event) is yaml.StreamEndEvent:
+                return
+    finally:
+        loader.dispose()
 
 
 # What one parameter was given: a slot for each type, of which readers take the first.
@@ -101,9 +110,10 @@ class _ValueReader:
     def __init__(self) -> None:
         self.in_list = False
         self._type: type | None = None  # of the items so far
+        self._list: tuple[_Slots, list[Scalar]] | None = None  # with the parameter that it is of
 
     def begin_list(self) -> None:
-        self.in_list, self._type = True, None
+        self.in_list, self._type, self._list = True, None, None
 
     def end_list(self, slots: _Slots) -> None:
         if self.in_list and self._type is None:
@@ -116,12 +126,16 @@ class _ValueReader:
             slots[type_slot(value)] = value
         elif self._type is None:
             self._type = type(value)
-            slots[type_slot((value,))] = [value]
+            items = [value]
+            slots[type_slot((value,))] = items
+            self._list = slots, items
+        elif self._list is not None and self._list[0] is slots and self._type is type(value):
+            self._list[1].append(value)
         else:
-            items = slots.get(type_slot((value,)))
-            if self._type is not type(value) or not isinstance(items, list):
+            known = slots.get(type_slot((value,)))
+            if self._type is not type(value) or not isinstance(known, list):
                 raise _refused(line, "the items of a list must be of one type")
-            items.append(value)
+            known.append(value)
 
 
 class _Path:
@@ -186,6 +200,8 @@ class _FileReader:
         if kind == "scalar":
             if self._key_is_next:
                 self._take_key(text, line)
+            elif self._values.in_list and self._section.names:
+                self._values.take(self._section.slots[self._at], text, style, line)
             else:
                 self._take_value(text, style, line)
         elif kind == "[":

@@ -22,6 +22,7 @@ _DOUBLE = re.compile(
 _NAMED_DOUBLE = re.compile(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
 _BEGIN_NUMBERS = frozenset("+-.0123456789 \t\n\v\f\r")
 _NAMES_OF_NUMBERS = frozenset(("inf", "infinity", "nan"))
+_DIGITS_THAT_FIT = 19
 _MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
 _TYPE_NAMES: dict[type, str] = {bool: "bool", int: "int", float: "double", str: "string", bytes: "byte"}
 _SLOTS: dict[type, int] = {bool: 0, int: 1, float: 2, str: 3, bytes: 5}
@@ -45,10 +46,16 @@ def plain_scalar(text: str) -> Scalar:
     """Type a plain YAML scalar by the rules of rcl's parser (``parse.c``, ``get_value``), which are not YAML 1.1's."""
     if text in _BOOLEANS:
         return _BOOLEANS[text]
+    if len(text) < _DIGITS_THAT_FIT and text.isascii():  # most numbers; the rest is for strtoll and strtod
+        if text.isdigit():
+            if text[0] != "0":
+                return int(text)
+        elif text[:1].isdigit() and text.replace(".", "", 1).isdigit() and (number := float(text)) > 0:
+            return number
     if text[:1] not in _BEGIN_NUMBERS and text.lower() not in _NAMES_OF_NUMBERS:
         return text
-    number = _strtoll(text) if _INTEGER.fullmatch(text) else None
-    return _strtod(text) if number is None else number
+    integer = _strtoll(text) if _INTEGER.fullmatch(text) else None
+    return _strtod(text) if integer is None else integer
 
 
 def _strtoll(text: str) -> int | None:
