@@ -4,6 +4,7 @@ As in rcl: parameters are filled in, the name is expanded, then the first matchi
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import Literal, NamedTuple
@@ -198,7 +199,7 @@ class _Collector:
             self._name(endpoint, NameTemplate.literal(name), note)
         if len(sets) > 1:
             parameters = {each for each in (endpoint.name, *endpoint.readings) if not each.is_literal}
-            where = SourceLocation.read(str(endpoint.source))
+            where = self._where(str(endpoint.source))
             warning = record_undecided(self._fqn, sorted(granted), sorted(map(str, parameters)), where)
             self._result.warnings.append(warning)
 
@@ -210,7 +211,7 @@ class _Collector:
         operation, place = OPERATIONS[endpoint.kind], str(endpoint.source)
         written = endpoint.written or str(endpoint.name)
         if "__" in template.text:
-            where = SourceLocation.read(place)
+            where = self._where(place)
             self._result.warnings.append(name_unremappable(self._fqn, template.text, where))
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
@@ -313,7 +314,7 @@ class _Collector:
     def _warn_of_idle_rule(self, action: str, place: str) -> None:
         rule = self._names.rule_matching(action)
         if rule is not None:
-            where = SourceLocation.read(rule.origin or place)
+            where = self._where(rule.origin or place)
             self._result.warnings.append(action_remap_idle(self._fqn, rule.text, action, self._distro, where))
 
     def _pattern(self, endpoint: Endpoint, template: NameTemplate) -> None:
@@ -322,7 +323,10 @@ class _Collector:
         text = template.text
         why = "; ".join(p.why for p in template.parts if isinstance(p, UnknownPart) and p.why)
         if not self._options.accept_patterns or not text.replace("*", "").strip("/~"):
+            has_text = text.replace("*", "").strip("/~")
             unknown = f"the name of what it would {operation.verb} is not known ({template}: {why})"
+            if not has_text and why:
+                unknown = f"the name of what it would {operation.verb} is not known: {why}"
             self._unresolved(operation, place, unknown)
             return
         try:
@@ -334,8 +338,12 @@ class _Collector:
         note = f"a pattern, because {why}; accepted by --accept-patterns"
         reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note, endpoint.type)
         self._result.permissions.append(Permission(operation, name, reason))
-        warning = pattern_accepted(self._fqn, operation.verb, name, note, SourceLocation.read(place))
+        warning = pattern_accepted(self._fqn, operation.verb, name, note, self._where(place))
         self._result.warnings.append(warning)
+
+    def _where(self, place: str) -> SourceLocation:
+        """Return the place to report: of what our own documents say, that of the node in the launch file."""
+        return self._node.location if place.startswith(_OWN_DOCUMENTS) else SourceLocation.read(place)
 
     def _impossible(self, error: InvalidNameError) -> None:
         impossible = node_name_impossible(self._fqn, str(error), self._node.location)
@@ -344,8 +352,16 @@ class _Collector:
     def _unresolved(self, operation: Operation | None, place: str, why: str) -> None:
         interface = self._node.interface
         program = f"{interface.package}/{interface.executable or interface.plugin}"
-        unknown = interface_unknown(self._fqn, why, program, SourceLocation.read(place))
+        unknown = interface_unknown(self._fqn, why, program, self._where(place))
         self._result.unresolved.append(Unresolved(operation, unknown))
+
+
+_HOME = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+_OWN_DOCUMENTS = tuple(
+    os.path.join(_HOME, *folder, "")
+    for folder in (("enclave_addons", "library", "documents"), ("nodl", "document", "common"))
+)
+"""Folders of documents that come with us, in which a user has nothing to correct."""
 
 
 @lru_cache(maxsize=256)

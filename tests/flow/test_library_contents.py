@@ -435,6 +435,8 @@ def test_a_controller_manager_gets_what_its_spawners_load(launch: Launch, tmp_pa
     assert "/controller_manager/set_parameters" not in allowed(plan, "call_services")
     plan = launch(CONTROL.format(urdf="output of xacro, which is not installed", file=file, words=""))
     assert ": 'output of xacro, which is not installed'" in problems(plan), "the text says what is missing"
+    (place,) = {each.location.file for each in plan.problems if each.location and "xacro" in each.text}
+    assert place.endswith(".launch.xml"), "a user has nothing to correct in a document that comes with us"
 
 
 HARDWARE = (
