@@ -284,6 +284,8 @@ def _expiry(deployment: Deployment, keystore: str, setup: tuple[str, ...]) -> st
         "[Unit]",
         f"Description=Warn before certificates and permissions in {_specifiers(keystore)} expire",
         f"PartOf={deployment.name}.target",
+        "Wants=time-sync.target",
+        "After=time-sync.target",
         "",
         "[Service]",
         "Type=oneshot",

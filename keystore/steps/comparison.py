@@ -39,6 +39,7 @@ from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.shares import Share
+from keystore.formats.subject import subject_name
 from keystore.formats.validity import Validity, iso, later, utc_now
 from keystore.signing import smime
 from keystore.steps.enclave_state import (
@@ -299,6 +300,20 @@ def inspect_wanted(
     return state._replace(reissue=wanted.reissue, permissions=True, reasons=(*state.reasons, "requested"))
 
 
+def _other_domains(
+    view: KeystoreView, state: EnclaveState, wanted: PermissionsSource
+) -> tuple[Domains, Domains] | None:
+    """Return the domains that are signed and those that are wanted, if the first lack some of the second."""
+    if state.facts is None or state.facts.common_name is None:
+        return None
+    with suppress(KeystoreError):
+        present = _signed(view, state.enclave).domains
+        document = wanted(subject_name(state.facts.common_name), state.facts.validity)
+        requested = parse_permissions(document).domains if document is not None else present
+        return None if present.covers(requested) else (present, requested)
+    return None
+
+
 _SHOWN = 10
 
 
@@ -339,6 +354,13 @@ def _reasons(view: KeystoreView, state: EnclaveState, wanted: PermissionsSource)
 def _permission_differences(
     view: KeystoreView, state: EnclaveState, wanted: PermissionsSource
 ) -> Iterator[str]:
+    if domains := _other_domains(view, state, wanted):
+        present, requested = domains
+        yield (
+            f"it is for domain {present}, and domain {requested} is asked for: start it in its domain "
+            f"(ROS_DOMAIN_ID={present.ranges[0][0]}), or start once in domain {requested} where the CA keys are"
+        )
+        return
     beyond, missing = beyond_and_missing(view, state, wanted)
     for words, found in (("lacks", missing), ("has beyond it", beyond)):
         if found:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import shlex
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.disk.signed_documents import governance_stands, own_document, signed_governance
+from keystore.disk.signed_documents import (
+    governance_domains,
+    governance_stands,
+    own_document,
+    signed_governance,
+)
 from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, SigningUnavailableError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.register import Register
@@ -50,9 +56,25 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
     view = KeystoreView(opened.root)
     if governance_stands(view, domains, opened.register):
         return False
+    _refuse_other_domains(view, domains)
     document = governance_for(view, opened.register, domains)
     write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
     return True
+
+
+def _refuse_other_domains(view: KeystoreView, domains: Domains) -> None:
+    """Raise SigningUnavailableError with both cures, if the CA's key is not here and other domains are the reason."""
+    if view.key_file(Role.PERMISSIONS) is not None:
+        return
+    governed = domains
+    with suppress(KeystoreError):  # of a damaged governance, which is reported where it would be signed
+        governed = governance_domains(view)
+    if not governed.covers(domains):
+        raise SigningUnavailableError(
+            f"{printable(view.root)} is for domain {governed}, and domain {domains} is asked for (ROS_DOMAIN_ID or "
+            f"--domain-id); start in its domain (ROS_DOMAIN_ID={governed.ranges[0][0]}), or start once in domain "
+            f"{domains} where the CA keys are, then export and import again"
+        )
 
 
 def governance_for(view: KeystoreView, register: Register, domains: Domains) -> bytes:

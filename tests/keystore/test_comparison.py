@@ -15,6 +15,7 @@ import pytest
 
 from enclave_addons.deployment import export
 from keystore import (
+    CreateOptions,
     DamagedKeystoreError,
     Domains,
     EnclavePolicy,
@@ -30,6 +31,7 @@ from keystore import (
     UnsafeKeystoreError,
     apply_policy,
     create_enclaves,
+    create_keystore,
     provision,
     remove,
     roll_over,
@@ -302,3 +304,20 @@ def test_a_bundle_that_grants_more_than_ours_is_taken_as_a_union_and_one_that_la
         again(tmp_path / "bundle", kit.policy("/a", "/third"), launch=hold)
     with pytest.raises(SigningUnavailableError, match="has beyond it publish rt/other"):
         again(tmp_path / "bundle", kit.policy("/a"))
+
+
+@pytest.mark.parametrize("governed", ["0", "0-5"])
+def test_a_host_that_starts_in_another_domain_is_told_the_domain_and_both_cures(
+    tmp_path: Path, governed: str
+) -> None:
+    root, host = tmp_path / "ks", tmp_path / "host"
+    create_keystore(root, CreateOptions(domains=Domains.parse(governed), durable=False))
+    provision(root, [kit.policy("/a")], options=kit.options(domains=Domains.single(0)))
+    shutil.copytree(root, host, symlinks=True)
+    shutil.rmtree(host / "private")
+    with pytest.raises(SigningUnavailableError) as caught:
+        provision(host, [kit.policy("/a")], options=kit.options(domains=Domains.single(3)))
+    told = str(caught.value)
+    assert "domain 3 is asked for" in told and "ROS_DOMAIN_ID=0" in told
+    assert "in domain 3 where the CA keys are" in told and "lacks" not in told
+    assert not provision(host, [kit.policy("/a")], options=kit.options(domains=Domains.single(0))).changed
