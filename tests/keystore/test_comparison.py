@@ -201,7 +201,7 @@ class TestWhatAStartFinds:
     def test_a_directory_of_somebody_else_is_left_alone(self, tmp_path: Path) -> None:
         (tmp_path / "photos").mkdir()
         (tmp_path / "photos/me.jpg").write_text("")
-        with pytest.raises(NotAKeystoreError, match="exists and is not a keystore"):
+        with pytest.raises(NotAKeystoreError, match="is not a keystore, and other files are in it"):
             again(tmp_path / "photos")
         assert [path.name for path in (tmp_path / "photos").iterdir()] == ["me.jpg"]
 
