@@ -34,6 +34,7 @@ class Code(str, Enum):
     LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description is marked as deprecated"
     ROS_TIMER_ON_WALL_TIME = "ros-timer-on-wall-time", "A timer on simulated time fires on wall time"
     LOG_LEVEL_MISSING = "log-level-missing", "The action log requires a level since this distribution"
+    SCOPE_ENDED = "scope-ended", "What an event starts is not in the group that its handler is written in"
     NODE_NAME_REPEATED = "node-name-repeated", "Several nodes have the same fully qualified name"
     NOT_FORESEEABLE = "not-foreseeable", "An action only exists once a callback has run"
     PACKAGE_NOT_INSTALLED = "package-not-installed", "A placeholder stands for a package"

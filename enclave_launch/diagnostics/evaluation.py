@@ -28,6 +28,15 @@ def function_called_again(function: str, event: str, location: SourceLocation) -
     return Diagnostic(Code.FUNCTION_CALLED_AGAIN, function, text, location, remedy)
 
 
+def scope_ended(node: str, namespace: str, location: SourceLocation) -> Diagnostic:
+    """Report a node that an event starts outside of the namespace in which its handler is written."""
+    text = (
+        f"{node} is not in {namespace}: this is written in that group, and happens after the group has ended"
+    )
+    remedy = "give the node its namespace, or put the group inside the handler"
+    return Diagnostic(Code.SCOPE_ENDED, node, text, location, remedy)
+
+
 def include_left_out(path: str) -> Diagnostic:
     return Diagnostic(
         Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed or lacks it: {path}"

@@ -24,6 +24,7 @@ from enclave_launch.description.events.handlers import EventHandler
 from enclave_launch.description.events.queue import Handler
 from enclave_launch.description.location import location_of, place_of
 from enclave_launch.description.visit import AND_THEN, chain, run_handler
+from enclave_launch.diagnostics.evaluation import scope_ended
 from enclave_launch.evaluation.error_text import error_text
 from enclave_launch.frontend import error_location
 from enclave_launch.host.user_code import starts_nothing
@@ -120,7 +121,18 @@ class Explorer:
                 Unforeseeable(f"what a callback returns for {mark}", self._place(handler))
             )
             return
+        before = len(self._host.processes)
         run_handler(self._context, handler, event, mark)
+        self._note_scope(event.timer_action if isinstance(event, TimerEvent) else handler, before)
+
+    def _note_scope(self, later: object, before: int) -> None:
+        """Warn of nodes that ``later`` has started since, outside of the namespace in which it is written."""
+        _, namespace = self._host.written_in.get(id(later), (later, ""))
+        for process in self._host.processes[before:] if namespace else ():
+            own = process.namespace or "/"
+            if process.kind != "executable" and not f"{own}/".startswith(f"{namespace}/"):
+                name = process.name or process.process_name
+                self._host.warn(scope_ended(name, namespace, location_of(later, self._context)))
 
     def _remember(self, handler: Handler) -> None:
         self._fired.add(id(handler))

@@ -239,6 +239,10 @@ class Host(ABC):
         self._process_count += 1
         return self._process_count
 
+    @abstractmethod
+    def note_namespace(self, later: object, context: LaunchContext) -> None:
+        """Note the namespace in which a handler or a timer is written; only a plan uses it."""
+
     def warn(self, warning: Diagnostic) -> None:
         """Warn the person; of the same once."""
         if warning not in self._warned:

@@ -42,12 +42,18 @@ class PlanHost(Host):
         self.processes: list[ResolvedProcess] = []
         self.started: list[ExecuteLocal] = []  # action of each process, same order
         self.components: list[ResolvedComponent] = []
+        self.written_in: dict[int, tuple[object, str]] = {}  # of handlers and timers, by id
         self.lifecycle_components: list[LifecycleComponent] = []
         self.calls: list[LauncherCall] = []
         self.unforeseen: list[Unforeseeable] = []
         self.reactions: list[Reaction] = []
         self.parameter_files: dict[str, str] = {}
         self.loop = VirtualLoop()
+
+    def note_namespace(self, later: object, context: LaunchContext) -> None:
+        namespace = context.launch_configurations.get("ros_namespace")
+        if namespace:
+            self.written_in[id(later)] = (later, str(namespace))
 
     def started_so_far(self) -> int:
         return len(self.processes) + len(self.components) + len(self.calls) + self.loop.used

@@ -148,6 +148,9 @@ class LiveHost(Host):
                 lambda message: context.emit_event_sync(StateTransition(action=component, msg=message)),
             )
 
+    def note_namespace(self, later: object, context: LaunchContext) -> None:
+        """Do nothing: only a plan compares it with where the event starts something."""
+
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Do nothing: only a plan has to say so, here it simply happens."""
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from enclave_launch.diagnostics import Code
 from enclave_launch.policy.launcher import launcher_node
 from enclave_launch.process import Evaluation
 
@@ -78,6 +79,46 @@ def test_lifecycle_tags_where_the_release_has_them(launched: Evaluate) -> None:
     assert [component.fqn for component in result.components] == ["/m"]
     with pytest.raises(Exception, match="Unrecognized entity of the type: lifecycle_node"):
         launched(text, distro="jazzy@2026-06")
+
+
+SCOPES = """
+from launch import LaunchDescription
+from launch.actions import GroupAction, RegisterEventHandler, TimerAction
+from launch.event_handlers import OnProcessExit
+from launch_ros.actions import Node, PushRosNamespace
+
+def generate_launch_description():
+    first = Node(package="pk", executable="e", name="first")
+    next = Node(package="pk", executable="e", name="next", namespace="{namespace}")
+    handler = RegisterEventHandler(OnProcessExit(target_action=first, on_exit=[next]))
+    timer = TimerAction(period=1.0, actions=[next])
+    return LaunchDescription([first, {group}])
+"""
+
+
+@pytest.mark.parametrize(
+    ("group", "namespace", "distro", "is_reported"),
+    [
+        ("GroupAction([PushRosNamespace('r1'), handler])", "", "lyrical", True),
+        ("GroupAction([PushRosNamespace('r1'), handler])", "/r1", "lyrical", False),
+        ("GroupAction([PushRosNamespace('r1'), handler])", "/r1/arm", "lyrical", False),
+        ("GroupAction([PushRosNamespace('r1'), handler])", "/r12", "lyrical", True),
+        ("PushRosNamespace('r1'), handler", "", "lyrical", False),
+        ("handler", "", "lyrical", False),
+        ("GroupAction([PushRosNamespace('r1'), timer])", "", "humble", True),
+        ("GroupAction([PushRosNamespace('r1'), timer])", "", "lyrical", False),
+    ],
+)
+def test_what_an_event_starts_outside_of_the_group_of_its_handler_is_reported(
+    launched: Evaluate, group: str, namespace: str, distro: str, is_reported: bool
+) -> None:
+    found = launched(SCOPES.format(group=group, namespace=namespace), syntax="py", distro=distro)
+    (*_, process) = found.processes
+    assert process.name == "next"
+    told = [warning.text for warning in found.warnings if warning.code is Code.SCOPE_ENDED]
+    assert bool(told) == is_reported
+    if told:
+        assert told[0].startswith("next is not in /r1: ")
 
 
 COMPONENTS = """

@@ -44,6 +44,7 @@ class RegisterEventHandler(_OfHandler):
         place = self.source_location
         if place is not None and getattr(self.event_handler, "source_location", None) is None:
             self.event_handler.source_location = place
+        context.host.note_namespace(self.event_handler, context)
         context.register_event_handler(self.event_handler)
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:

@@ -98,6 +98,7 @@ class TimerAction(Action):
             return None
         self.__locals = dict(context.get_locals_as_dict())
         self.__keep_state(context)
+        context.host.note_namespace(self, context)
         _install_timer_handler(context)
         loop.call_soon(self._start_waiting, context, context.on_event)
         if perform_typed_substitution(context, self.__cancel_on_shutdown, bool):
