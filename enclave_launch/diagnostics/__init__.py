@@ -9,6 +9,7 @@ from enum import Enum
 from itertools import groupby
 from typing import NamedTuple
 
+from enclave_common.words import some_of
 from enclave_launch.source_location import SourceLocation
 
 
@@ -146,13 +147,25 @@ class Diagnostic(NamedTuple):
 
 
 def refusal(problems: Iterable[Diagnostic]) -> str:
-    """Return what a secured start is refused for, as one message; neighbours with the same remedy share it."""
+    """Return what a secured start is refused for, as one message.
+
+    Neighbours with the same remedy share it. Those that differ in their subject alone are one line.
+    """
     lines: list[str] = []
     for remedy, group in groupby(problems, lambda problem: problem.remedy):
-        alike = list(group)
-        if remedy and len(alike) > 1:
-            lines += [str(problem._replace(remedy="")) for problem in alike]
-            lines.append(f"for each of these {len(alike)}: {remedy}")
-        else:
-            lines += map(str, alike)
+        kinds: dict[str, list[Diagnostic]] = {}
+        for problem in group:
+            kinds.setdefault(problem.text.replace(problem.subject, ""), []).append(problem)
+        for first, *others in kinds.values():
+            also = some_of((_other_than(first, other) for other in others), _NAMED)
+            lines.append(f"{first._replace(remedy='')}{f' (the same for {also})' if also else ''}")
+        lines += [f"try: {remedy}"] if remedy else []
     return "\n".join((*lines, "nothing was started or written"))
+
+
+def _other_than(first: Diagnostic, other: Diagnostic) -> str:
+    """Return what ``other`` is about: its subject, or its place if both have one subject."""
+    return str(other.location) if other.subject == first.subject and other.location else other.subject
+
+
+_NAMED = 5  # subjects of one cause, by name

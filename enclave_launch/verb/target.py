@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_common.words import did_you_mean, some_of
+from enclave_common.words import did_you_mean, nearest, some_of
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate
 from nodl import ament_index
@@ -65,7 +65,10 @@ def _beside(path: str) -> str:
         beside = os.listdir(folder or ".")
     except OSError:  # no such folder, or no permission to list it
         return ""
-    return did_you_mean(name, [each for each in beside if each.endswith((".py", ".xml", ".yaml", ".yml"))])
+    # Compared without what all launch files have in common, such as .launch.xml.
+    stems = {each.split(".")[0]: each for each in beside if each.endswith((".py", ".xml", ".yaml", ".yml"))}
+    meant = name if name in stems else nearest(name.split(".")[0], stems)
+    return f"; did you mean {stems[meant]!r}?" if meant else ""
 
 
 def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:

@@ -43,10 +43,11 @@ def test_a_refusal_of_several_nodes_says_once_what_to_do(
     refused = secure_launch(
         "--secure", "--keystore", tmp_path / "ks", "--prefix", workspace, write(one + other)
     )
-    assert refused.returncode == 1 and refused.stderr.count("no NoDL manifest for robot/engine") == 2
-    assert refused.stderr.count("--learn") == 1 and "for each of these 2: let it run once" in refused.stderr
+    assert refused.returncode == 1 and refused.stderr.count("no NoDL manifest for robot/engine") == 1
+    assert "(the same for " in refused.stderr and "test.launch.xml:2)" in refused.stderr
+    assert refused.stderr.count("--learn") == 1 and "\ntry: let it run once with --learn" in refused.stderr
     alone = secure_launch("--secure", "--keystore", tmp_path / "ks", "--prefix", workspace, write(one))
-    assert "for each" not in alone.stderr and "; let it run once with --learn" in alone.stderr
+    assert "the same for" not in alone.stderr and "\ntry: let it run once with --learn" in alone.stderr
 
 
 @pytest.mark.parametrize("way", [("--format", "policy"), ("--dump-params",)])

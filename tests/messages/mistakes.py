@@ -29,6 +29,8 @@ PROGRAMS = {
 }
 FILES = {
     "demo.launch.xml": '<launch>\n<arg name="count" default="1"/>\n<node pkg="demo_nodes" exec="talker"/>\n</launch>\n',
+    "two.launch.xml": '<launch>\n<node pkg="demo_nodes" exec="talker" launch-prefix="env -i"/>\n'
+    '<node pkg="demo_nodes" exec="listener" launch-prefix="env -i"/>\n</launch>\n',
     "unknown.launch.xml": '<launch>\n<node pkg="unknown_driver" exec="driver"/>\n</launch>\n',
     "hosts.yaml": "version: 1\nhosts:\n  a:\n    enclave: [/talker]\n",
     "no_version.yaml": "hosts: {a: {enclaves: [/talker]}}\n",
