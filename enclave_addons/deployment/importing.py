@@ -234,7 +234,10 @@ def _refuse_other_host(
     if options.host not in (None, host):
         raise InvalidInputError(f"this keystore is that of host {host}, not of {options.host}")
     if manifest.host != host:
-        raise UnsafeKeystoreError(f"{place} is for host {manifest.host}; this is {host}")
+        raise UnsafeKeystoreError(
+            f"{place} is for host {manifest.host}; this is {host}\n"
+            f"try: import it on {manifest.host}; if this machine is that host, add --host {manifest.host}"
+        )
 
 
 def _check_files(found: _Bundle) -> None:
