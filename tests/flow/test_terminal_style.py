@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -114,10 +115,17 @@ def in_a_terminal(tmp_path: Path, command: str, *capture: str, keys: tuple[str, 
 LAUNCH = f"-m enclave_launch --dry-run --prefix {shlex.quote(str(DEMO))} demo_nodes talker_listener_remap.launch.xml"
 
 
-def test_recorded_in_a_real_terminal(tmp_path: Path) -> None:
-    command = f"sh -c {shlex.quote(f'{PYTHON} {LAUNCH}; echo DONE; sleep 60')}"
+@pytest.mark.parametrize(
+    ("setting", "enclave", "codes"),
+    [("NO_COLOR=1", "/ear", set()), ("NO_COLOR=", "\033[36m/ear", {"\033[36m", "\033[39m"})],
+    ids=["NO_COLOR", "colours"],
+)
+def test_recorded_in_a_real_terminal(setting: str, enclave: str, codes: set[str], tmp_path: Path) -> None:
+    """Colours, unless NO_COLOR is set, and nothing else: no cursor movement."""
+    command = f"sh -c {shlex.quote(f'export {setting}; {PYTHON} {LAUNCH}; echo DONE; sleep 60')}"
     shown = in_a_terminal(tmp_path, command, "-e")
-    assert "\033[" not in shown and "├── enclave /ear" in shown
+    assert f"├── enclave {enclave}" in shown
+    assert set(re.findall(r"\033\[[^A-Za-z]*[A-Za-z]", shown)) == codes
 
 
 def test_a_slow_analysis_says_what_it_does_once_in_a_while(monkeypatch: pytest.MonkeyPatch) -> None:

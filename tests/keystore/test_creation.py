@@ -276,4 +276,10 @@ def test_keys_never_travel_in_arguments() -> None:
     )
     offered = {word.strip("[],") for word in done.stdout.split() if word.strip("[").startswith("--")}
     secrets = {word for word in offered if "pass" in word or "pin" in word}
-    assert secrets == {"--passphrase-file", "--passphrase-fd", "--passphrase-env", "--pin-file", "--pin-env"}
+    assert secrets == {
+        "--ca-passphrase-file",
+        "--ca-passphrase-fd",
+        "--ca-passphrase-env",
+        "--pin-file",
+        "--pin-env",
+    }

@@ -55,7 +55,7 @@ def deployed(tmp_path: Path, text: str) -> dict[str, Path]:
     (tmp_path / "hosts.yaml").write_text(HOSTS)
     launch = launch_file(tmp_path, text)
     ca = provisioned(launch, tmp_path / "ca")
-    enclaves = tmp_path / "enclaves.yaml"
+    enclaves = tmp_path / "placed.yaml"
     hosts = ("--hosts", str(tmp_path / "hosts.yaml"))
     assert secure_plan("hosts", launch, *hosts, "--write-enclaves", str(enclaves)) == 0
     assigned = {host: one.enclaves for host, one in load_hosts(enclaves).hosts.items()}
