@@ -83,7 +83,8 @@ class NodeInterface(NamedTuple):
     why they may not have shown all of it. ``parameters_complete``: its description says that ``parameters`` lists all.
     ``unused_configuration``: what the program does not take of the files that it is given, and why. ``source_digest``:
     of a manifest that inference wrote, the digest of its source. ``parameter_types``: parameters that are declared with
-    exactly this type, as NoDL 2 names it.
+    exactly this type, as NoDL 2 names it. ``of_process``: the program makes the node without the options that a
+    container gives to a component, so that it obeys the arguments of the process even there (ros2/rclcpp#3003).
     """
 
     package: str | None
@@ -108,6 +109,7 @@ class NodeInterface(NamedTuple):
     unused_configuration: tuple[str, ...] = ()
     source_digest: str = ""
     parameter_types: tuple[tuple[str, str], ...] = ()
+    of_process: bool = False
 
 
 class ManifestNode(NamedTuple):

@@ -25,6 +25,7 @@ from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
 from nodl.ros_arguments import parse_ros_arguments, remap_arguments
 
 _UNDECIDED = "whether the node listens to what the launch gives it (use_global_arguments) is not known"
+_NO_CONTAINER = "the node obeys the arguments of its container, which this launch does not start"
 
 Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
 
@@ -92,19 +93,22 @@ def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> M
 def node_of_component(
     component: ResolvedComponent, container: ResolvedProcess | None, interface: NodeInterface, enclave: str
 ) -> RunningNode:
-    """Return a node of ``component``: its main one obeys the load request, a further one (with rules of its own) the
+    """Return a node of ``component``: its main one obeys the load request, one with options of its own the
     container's command line.
 
     :raises LaunchFileError: rcl would refuse to start because of a remap rule."""
     forwarded: tuple[ParsedRule, ...] = ()
     forwards = component.extra_arguments.get("forward_global_arguments") is True
-    if container is not None and (forwards or interface.own_rules):
+    further = bool(interface.own_rules) or interface.of_process
+    if container is not None and (forwards or further) and interface.global_arguments is not False:
         forwarded = _rules_of_command(container)
-    local = _own_rules(interface) or _rules_of_load_request(component)
+    local = _own_rules(interface) if further else _rules_of_load_request(component)
+    if container is None and interface.of_process:
+        interface = interface._replace(gaps=(*interface.gaps, Gap(interface.source, _NO_CONTAINER)))
     rules = RemapRules(local=local, process=forwarded)
     inputs = environment_inputs(container) if container is not None else ProgramInputs()
     node = _named(interface, rules, enclave, component.location, "component", inputs)
-    if not interface.own_rules:
+    if not further:
         node = node._replace(parameters=component.parameters)
     elif container is not None:
         node = node._replace(parameters=parameters_of_node(container, node.namespace, node.name))

@@ -147,6 +147,19 @@ def test_a_further_node_of_a_component_obeys_its_own_rules_and_the_container(tmp
     assert (node.fqn, names(node)) == ("/cell/helper", ["by_command_line"])
 
 
+def test_a_further_node_without_options_obeys_the_container_and_not_the_load_request(tmp_path: Path) -> None:
+    """rcl gives it the arguments of the process (ros2/rclcpp#3003), so that it gets the container's name, too."""
+    helper = interface(original="helper", of_process=True)
+    node = component_node(tmp_path, helper, 'name="eye" namespace="/left"', REMAP)
+    assert (node.fqn, names(node)) == ("/cell/box", ["by_command_line"])
+    deaf = component_node(tmp_path, helper._replace(global_arguments=False), 'name="eye"', REMAP)
+    assert (deaf.fqn, names(deaf)) == ("/helper", [])
+    loaded = component_node(tmp_path, helper, 'name="eye"', contained=False)
+    assert [gap.why.split(",")[0] for gap in loaded.interface.gaps] == [
+        "the node obeys the arguments of its container"
+    ]
+
+
 def test_forwarded_rules_come_after_those_of_the_load_request(tmp_path: Path) -> None:
     forward = '<extra_arg name="forward_global_arguments" value="true"/>'
     node = component_node(tmp_path, interface(), 'name="eye"', REMAP + forward)

@@ -37,6 +37,7 @@ class PossibleEndpoint:
 @dataclass(eq=False)
 class AllocatedNode:
     """A node under construction. ``description``: the class of a library that makes it for itself;
+    ``of_process``: it is made without the options that a container gives.
     ``parameter_services``: they, or its parameter events, are not certainly switched off."""
 
     source: SourceRef
@@ -51,6 +52,8 @@ class AllocatedNode:
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True
+    of_process: bool = False
+    statistics: bool = False  # node options ask for topic statistics of its subscriptions
     parameter_services: bool = False
     description: str = ""
 

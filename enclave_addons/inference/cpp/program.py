@@ -19,11 +19,11 @@ from enclave_addons.inference.cpp.engine.machine import Machine, StepLimitExceed
 from enclave_addons.inference.cpp.engine.objects import construct, initial_value
 from enclave_addons.inference.cpp.engine.places import static_place
 from enclave_addons.inference.cpp.engine.sites import CREATES
-from enclave_addons.inference.cpp.engine.values import Seq, Value, unknown
+from enclave_addons.inference.cpp.engine.values import Seq, Value, literal, unknown
 from enclave_addons.inference.cpp.entry import CppSupportMissing, Entry, failure
 from enclave_addons.inference.cpp.findings import AllocatedNode
 from enclave_addons.inference.cpp.models.loaded import host_of, load
-from enclave_addons.inference.cpp.models.nodes import ARGUMENT
+from enclave_addons.inference.cpp.models.nodes import ARGUMENT, OF_CONTAINER
 from enclave_addons.inference.cpp.reading.built import Definitions, named_in
 from enclave_addons.inference.cpp.reading.cmake import Target
 from enclave_addons.inference.cpp.reading.collect import index_file
@@ -322,7 +322,9 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
 def _entry_arguments(run: Machine, cls: Class) -> list[Value]:
     """Return what a container gives: node options, to the constructor that takes only these; else it is not known."""
     constructors = run.names.find_methods(cls, cls.name)
-    options: Value = (run.object(("options", cls), Type("rclcpp::NodeOptions")),)
+    given = run.object(("options", cls), Type("rclcpp::NodeOptions"))
+    run.store.set((given, OF_CONTAINER), literal(OF_CONTAINER))
+    options: Value = (given,)
     required = {c: [p for p in c.parameters if p.default is None] for c in constructors}
     one = [c for c in constructors if len(required[c]) <= 1 and any(map(_is_options, c.parameters))]
     if one:

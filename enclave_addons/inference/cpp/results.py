@@ -167,7 +167,7 @@ def _of_node(
             endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
             parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
             own_rules=rules, global_arguments=record.use_global_arguments, depends=depends,
-            parameter_services=record.parameter_services,
+            parameter_services=record.parameter_services, of_process=plugin is not None and record.of_process,
         )
         for name in dict.fromkeys(names)
         for namespace in dict.fromkeys(namespaces or ["/"])

@@ -45,10 +45,10 @@ class _Entry(NamedTuple):
 
 def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
     """Map file name to text. Helper nodes of a ``TransformListener`` are in the document of the node beside them."""
-    listeners = {program_key(node) for node in nodes if (node.name or "").endswith(RANDOM_ENDING)}
+    listeners = {program_key(node) for node in nodes if _is_listener(node)}
     documents: dict[str, str] = {}
     for node in nodes:
-        if (node.name or "").endswith(RANDOM_ENDING):
+        if _is_listener(node):
             continue
         file = f"{_stem(node)}.nodl.yaml"
         if file in documents:
@@ -61,6 +61,10 @@ def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
 def program_key(node: NodeInterface) -> tuple[str | None, str | None, str | None]:
     """Return what the nodes of one program have in common."""
     return node.package, node.executable, node.plugin
+
+
+def _is_listener(node: NodeInterface) -> bool:
+    return (node.name or "").endswith(RANDOM_ENDING) and bool(node.own_rules)
 
 
 DEAF = "the node does not listen to the launch's arguments, or that is not known"
@@ -83,6 +87,12 @@ def open_questions(node: NodeInterface) -> list[str]:
         what = f"several interfaces are the {kind.value.replace('_', ' ')} {name} by default, and vary differently"
         questions.append(f"{node.source}: {what}")
     questions += [f"{node.source}: the program gives its node the rule {rule}" for rule in node.own_rules]
+    if (node.name or "").endswith(RANDOM_ENDING) and not _is_listener(node):
+        questions.append(f"{node.source}: the name of this node is different at each start")
+    if node.of_process and node.plugin:
+        questions.append(
+            f"{node.source}: the node obeys the arguments of the container, not those of the component"
+        )
     if not node.global_arguments:
         questions.append(f"{node.source}: {DEAF}")
     return list(dict.fromkeys(questions))

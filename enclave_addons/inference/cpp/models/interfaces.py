@@ -17,13 +17,20 @@ from enclave_addons.inference.cpp.engine.values import (
     Text,
     Value,
     concatenated,
+    join,
     literal,
     nodes_in,
     plain,
     unknown,
 )
 from enclave_addons.inference.cpp.findings import AllocatedNode
-from enclave_addons.inference.cpp.libraries import Call, library_function, library_method, node_method
+from enclave_addons.inference.cpp.libraries import (
+    Call,
+    library_class,
+    library_function,
+    library_method,
+    node_method,
+)
 from enclave_addons.inference.cpp.reading.type_names import NO_TYPE, Type, ros_type
 from nodl.node_interface import EndpointKind
 
@@ -108,11 +115,36 @@ def _adapted(call: Call) -> str:
     return ros_type(kind.arguments[-1] if kind.last in ("TypeAdapter", "as") and kind.arguments else kind)
 
 
+@library_class("rclcpp::SubscriptionOptions")
+def _subscription_options(run: Machine, call: Call) -> Value | None:
+    given = next((each for each in call.value(0) if isinstance(each, Obj)), None)
+    if given is not None and given.type.name == call.this.type.name:
+        return (given,)
+    inner = run.object(call.key("statistics"), Type("rclcpp::TopicStatisticsOptions"))
+    run.store.set((call.this, "topic_stats_options"), (inner,))
+    return None
+
+
 def _statistics(run: Machine, call: Call) -> None:
-    """Add a gap if the options of a subscription may request topic statistics (rclcpp/subscription_options.hpp)."""
-    for atom in (atom for value in call.values[2:] for atom in value):
-        if isinstance(atom, Obj) and run.store.get((atom, "topic_stats_options")):
-            run.gap(call.node, call.frame, "topic statistics of a subscription are not followed", call.record)
+    """Add the publisher that the options of a subscription, or of its node, request for topic statistics.
+
+    Source: rclcpp/create_subscription.hpp, topic_statistics_state.hpp, subscription_options.hpp.
+    """
+    given = (atom for value in call.values[2:] for atom in value if isinstance(atom, Obj))
+    options = [each for atom in given for each in run.store.get((atom, "topic_stats_options"))]
+    states = [str(getattr(each, "why", "")) for one in options for each in run.store.get((one, "state"))]
+    default = "Enable" if call.record.statistics else "Disable"
+    ends = {
+        default if each.endswith("NodeDefault") else each.rpartition("::")[2] for each in states or [default]
+    }
+    if ends == {"Disable"}:
+        return
+    if ends - {"Enable", "Disable"}:
+        run.gap(
+            call.node, call.frame, "whether the subscription has topic statistics is not known", call.record
+        )
+    names = join(*(run.store.get((one, "publish_topic")) for one in options)) or literal("/statistics")
+    run.endpoint(call.record, PUB, names, "statistics_msgs/msg/MetricsMessage", call)
 
 
 def _generic(word: str, kind: EndpointKind) -> None:

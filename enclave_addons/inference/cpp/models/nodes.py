@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from enclave_addons.inference.cpp.engine.launch_values import text_of
+from enclave_addons.inference.cpp.engine.launch_values import settled, text_of
 from enclave_addons.inference.cpp.engine.machine import Machine
 from enclave_addons.inference.cpp.engine.values import (
     BOTTOM,
@@ -39,6 +39,8 @@ from enclave_addons.inference.cpp.libraries import (
 from enclave_addons.inference.cpp.syntax import field_of, text
 
 OPTIONS = "rclcpp::NodeOptions"
+OF_CONTAINER = "of the container"
+"""The field of node options that a container gives to a component."""
 
 
 def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> AllocatedNode:
@@ -49,10 +51,10 @@ def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> Allocat
         record = AllocatedNode(run.place(call.node, call.frame), lifecycle)
         run.nodes[this] = record
         this.node, this.is_node = record, True
-    record.names = join(record.names, call.value(0) or unknown("a name that is not given"))
+    record.names = join(record.names, settled(run, call.value(0)) or unknown("a name that is not given"))
     rest = call.values[1:]
     if rest and not _is_options(rest[0]):
-        record.namespaces = join(record.namespaces, rest[0])
+        record.namespaces = join(record.namespaces, settled(run, rest[0]))
         rest = rest[1:]
     for atom in (atom for value in rest for atom in value):
         if isinstance(atom, Obj) and atom.type.name == OPTIONS:
@@ -122,10 +124,15 @@ def _assigned(atom: object) -> str | None:
 
 
 def _asked_for(run: Machine, record: AllocatedNode, options: Obj, call: Call) -> None:
-    """Add a gap for what rclcpp makes if the options request it: topic statistics, logger services."""
+    """Note what rclcpp makes if the options request it; what is not known is a gap."""
+    record.statistics = truth(run.store.get((options, "enable_topic_statistics")) or BOTTOM) is True
     for name in ("enable_topic_statistics", "enable_logger_service"):
         given = run.store.get((options, name))
-        if given and truth(given) is not False:
+        if (
+            given
+            and truth(given) is not False
+            and not (record.statistics and name == "enable_topic_statistics")
+        ):
             run.gap(call.node, call.frame, f"what {name} of node options makes is not followed", record)
 
 
@@ -145,12 +152,23 @@ def _override(record: AllocatedNode, item: Value) -> None:
 
 @node_class("rclcpp::Node")
 def _plain_node(run: Machine, call: Call) -> None:
-    become_node(run, call)
+    become_node(run, call).of_process = _has_own_options(run, call)
 
 
 @node_class("rclcpp_lifecycle::LifecycleNode")
 def _lifecycle_node(run: Machine, call: Call) -> None:
-    become_node(run, call, lifecycle=True)
+    become_node(run, call, lifecycle=True).of_process = _has_own_options(run, call)
+
+
+def _has_own_options(run: Machine, call: Call) -> bool:
+    """Return whether a node gets no options, or options that the program made itself and not the container."""
+    given = next((value for value in call.values[1:] if _is_options(value)), None)
+    if given is None:
+        return all(
+            value and not any(isinstance(atom, Unknown) for atom in value) for value in call.values[1:]
+        )
+    own = (isinstance(atom, Obj) and not run.store.get((atom, OF_CONTAINER)) for atom in given)
+    return all(own)
 
 
 # --- what a node says of itself ---------------------------------------------------------------------------------

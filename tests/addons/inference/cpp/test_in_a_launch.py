@@ -280,3 +280,35 @@ def test_a_node_says_the_namespace_that_the_launch_or_else_the_code_gives(
     planned = plan(tmp_path, f'<launch><node pkg="demo" exec="filter_node" {namespace}/></launch>')
     assert all(may(planned, name) for name in made)
     assert not may(planned, not_made)
+
+
+HELPERS = (
+    HEAD
+    + """
+#include <rclcpp_components/register_node_macro.hpp>
+namespace demo {
+class Filter : public rclcpp::Node {
+public:
+  explicit Filter(const rclcpp::NodeOptions & options) : Node("filter", options) {
+    auto helper_ = std::make_shared<rclcpp::Node>("helper");
+    a_ = helper_->create_publisher<std_msgs::msg::Bool>("by_process", 1);
+    auto alone = rclcpp::NodeOptions().use_global_arguments(false);
+    auto map_ = std::make_shared<rclcpp::Node>("map", get_namespace(), alone);
+    b_ = map_->create_publisher<std_msgs::msg::Bool>("by_namespace", 1);
+    c_ = create_publisher<std_msgs::msg::Bool>("by_component", 1);
+  }
+};
+}
+RCLCPP_COMPONENTS_REGISTER_NODE(demo::Filter)
+"""
+)
+
+
+def test_nodes_that_a_component_makes_for_itself_have_the_names_that_rcl_gives_them(workspace: Path) -> None:
+    write(workspace / "src/demo/src/filter.cpp", HELPERS)
+    planned = plan(workspace, COMPONENT.replace('namespace=""', 'namespace="cell"'))
+    assert not planned.problems
+    assert may(planned, "/cell/by_process")
+    assert may(planned, "/rover/by_namespace")
+    assert may(planned, "/rover/by_component")
+    assert not any(may(planned, name) for name in ("/by_process", "/rover/by_process", "/by_namespace"))

@@ -99,6 +99,36 @@ ROWS = {
         ),
         {("service_server", "s"), ("publisher", "s/_service_event")},
     ),
+    "topic statistics of a subscription": (
+        in_class(
+            "rclcpp::SubscriptionOptions o; o.topic_stats_options.state = rclcpp::TopicStatisticsState::Enable; "
+            'create_subscription<std_msgs::msg::String>("in", 1, cb, o);'
+        ),
+        {("subscription", "in"), ("publisher", "/statistics")},
+    ),
+    "topic statistics on a topic that is written out": (
+        in_class(
+            "auto o = rclcpp::SubscriptionOptions(); "
+            "o.topic_stats_options.state = rclcpp::TopicStatisticsState::Enable; "
+            'o.topic_stats_options.publish_topic = "/my/statistics"; '
+            'create_subscription<std_msgs::msg::String>("in", 1, cb, o);'
+        ),
+        {("subscription", "in"), ("publisher", "/my/statistics")},
+    ),
+    "topic statistics that are switched off": (
+        in_class(
+            "rclcpp::SubscriptionOptions o; o.topic_stats_options.state = rclcpp::TopicStatisticsState::Disable; "
+            'o.topic_stats_options.publish_topic = "/never"; '
+            'create_subscription<std_msgs::msg::String>("in", 1, cb, o);'
+        ),
+        {("subscription", "in")},
+    ),
+    "topic statistics of all subscriptions of a node": (
+        HEAD + "int main(int argc, char ** argv) { rclcpp::init(argc, argv); "
+        'auto n = std::make_shared<rclcpp::Node>("n", rclcpp::NodeOptions().enable_topic_statistics(true)); '
+        'n->create_subscription<std_msgs::msg::String>("in", 1, cb); }',
+        {("subscription", "in"), ("publisher", "/statistics")},
+    ),
     "its own name": (
         in_class('create_publisher<std_msgs::msg::String>(std::string(get_name()) + "/a", 1);'),
         {("publisher", "{node}/a")},
