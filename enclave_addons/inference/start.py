@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from nodl.name_template import UnknownPart
 from nodl.node_interface import Gap, NodeInterface
+
+Progress = Callable[[int, int], None]
+"""Called with how many programs of how many are read."""
 
 
 class LaunchKey(NamedTuple):

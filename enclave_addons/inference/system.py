@@ -17,7 +17,7 @@ from enclave_addons.inference.python.analysis import analyse_rest, failure, star
 from enclave_addons.inference.python.check import may_make_interfaces, unsettled_places
 from enclave_addons.inference.python.program import Program
 from enclave_addons.inference.python.run import Run
-from enclave_addons.inference.start import LaunchKey
+from enclave_addons.inference.start import LaunchKey, Progress
 from nodl.node_interface import ClientLibrary, Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
@@ -37,22 +37,27 @@ class InferredSystem(NamedTuple):
     files: tuple[str, ...]
 
 
-def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
-    """Return all nodes that the Python and C++ files in ``paths`` (files, or folders with everything below) may create.
+def infer_paths(paths: Iterable[str | Path], progress: Progress | None = None) -> InferredSystem:
+    """Return all nodes that Python and C++ files may create.
 
-    Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
+    Args:
+        paths: Files, or folders with everything below.
+        progress: Called after each program, of either language.
+
+    Raises:
+        FileNotFoundError: A path does not exist. A file that cannot be parsed is a gap.
     """
     found = list(dict.fromkeys(file for path in paths for file in source_files(Path(path))))
     files = [file for file in found if file.endswith(".py") or not file.endswith(CPP_SUFFIXES)]
-    nodes, gaps = _python(files)
-    cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
+    nodes, gaps = _python(files, progress)
+    cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files], progress)
     # One may be found through several files of a program.
     return InferredSystem(
         tuple(dict.fromkeys([*nodes, *cpp_nodes])), (*dict.fromkeys(gaps), *cpp_gaps), tuple(found)
     )
 
 
-def _python(files: list[str]) -> tuple[Iterable[NodeInterface], Iterable[Gap]]:
+def _python(files: list[str], progress: Progress | None) -> tuple[Iterable[NodeInterface], Iterable[Gap]]:
     """Infer Python sources together: a file may use what another one makes. An earlier answer is taken if it holds."""
     if not files:
         return (), ()
@@ -65,7 +70,7 @@ def _python(files: list[str]) -> tuple[Iterable[NodeInterface], Iterable[Gap]]:
     if answer is None:
         failed: list[Gap] = []
         with without_collector():
-            nodes, gaps = _analysed(program, starts, failed)
+            nodes, gaps = _analysed(program, starts, failed, progress)
         answer = nodes, [*failed, *gaps]
         if not failed:
             cached.store(answer)
@@ -73,11 +78,13 @@ def _python(files: list[str]) -> tuple[Iterable[NodeInterface], Iterable[Gap]]:
 
 
 def _analysed(
-    program: Program, starts: list[_Start], failed: list[Gap]
+    program: Program, starts: list[_Start], failed: list[Gap], progress: Progress | None
 ) -> tuple[list[NodeInterface], list[Gap]]:
     runs: list[tuple[Run, LaunchKey]] = []
-    for each in starts:
+    for number, each in enumerate(starts, 1):
         runs.extend(_attempted(partial(_runs, program, each), each.file, failed))
+        if progress is not None:
+            progress(number, len(starts))
     entered = {node for run, _ in runs for node in run.entered}
     for run, _ in runs:
         analyse_rest(run, entered)
@@ -103,7 +110,7 @@ def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[G
         return []
 
 
-def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
+def _cpp(files: list[str], progress: Progress | None) -> tuple[list[NodeInterface], list[Gap]]:
     """Infer C++ sources. Without the extra ``cpp`` they are one gap."""
     if not files:
         return [], []
@@ -111,7 +118,7 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
     from enclave_addons.inference.cpp.system import infer_sources
 
     try:
-        inferred = infer_sources(files)
+        inferred = infer_sources(files, progress=progress)
     except CppSupportMissing as error:
         return [], [Gap(SourceRef(files[0]), str(error))]
     return inferred.nodes, inferred.gaps

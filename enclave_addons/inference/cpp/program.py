@@ -234,7 +234,8 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
         _start(run, entry)
         run_callbacks(run)
     except StepLimitExceeded:
-        run.gap_at(_place(entry), "this program is too large to be followed to its end")
+        why = f"this program was given up after {run.steps} steps; any interface beside those listed is possible"
+        run.gap_at(_place(entry), why)
     except Exception as error:
         run.gap_at(_place(entry), failure("the analysis of this program", error))
     return _findings(run, sources)

@@ -18,7 +18,7 @@ from enclave_addons.inference.cpp.program import Sources, run_program
 from enclave_addons.inference.cpp.reading.declarations import FileIndex, FunctionParameter
 from enclave_addons.inference.cpp.results import interfaces_of, program_gaps
 from enclave_addons.inference.cpp.syntax import text
-from enclave_addons.inference.start import LaunchKey, Start
+from enclave_addons.inference.start import LaunchKey, Progress, Start
 from enclave_common.files import text_or_nothing
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
@@ -80,7 +80,9 @@ def _garbage_at_the_end() -> Iterator[None]:
             gc.enable()
 
 
-def solve_all(sources: Sources, answers: Answers, programs: Sequence[Program]) -> list[Made]:
+def solve_all(
+    sources: Sources, answers: Answers, programs: Sequence[Program], progress: Progress | None = None
+) -> list[Made]:
     """Solve each of ``programs``: from earlier runs if nothing has changed, the others in parallel."""
     found = {each: answers.find(("program", *each)) for each in programs}
     groups = _groups([each for each, made in found.items() if made is None])
@@ -88,6 +90,8 @@ def solve_all(sources: Sources, answers: Answers, programs: Sequence[Program]) -
         for program, answer in zip(group, fresh, strict=True):
             answers.keep(("program", *program), answer)
             found[program] = answer
+        if progress is not None:
+            progress(sum(made is not None for made in found.values()), len(programs))
     return [made for each in programs if (made := found[each]) is not None]
 
 

@@ -22,7 +22,7 @@ from enclave_addons.inference.cpp.reading.project import SourcePackage, Workspac
 from enclave_addons.inference.cpp.solved import solve, solve_all
 from enclave_addons.inference.cpp.syntax import check_support
 from enclave_addons.inference.packages import read_package
-from enclave_addons.inference.start import LaunchKey, Start
+from enclave_addons.inference.start import LaunchKey, Progress, Start
 from enclave_common.files import text_or_nothing
 from enclave_common.words import did_you_mean, some_of
 from nodl.dependence import COMPONENT, HOST
@@ -42,7 +42,9 @@ class Inferred:
     dead: list[Gap] = field(default_factory=list)
 
 
-def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferred:
+def infer_sources(
+    files: Sequence[str], prefixes: Sequence[str] = (), progress: Progress | None = None
+) -> Inferred:
     """Infer the nodes of ``files``; raises ``CppSupportMissing``."""
     check_support()
     workspace = workspace_of(files, prefixes)
@@ -51,7 +53,7 @@ def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferre
     question = ("files", tuple(files), workspace.build_folders)
     found = answers.find(question)
     if found is None:
-        found = _infer(files, Sources(workspace), answers)
+        found = _infer(files, Sources(workspace), answers, progress)
         answers.keep(question, found)
     solved: tuple[Solved, ...] = found.answer
     return Inferred(
@@ -61,7 +63,9 @@ def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferre
     )
 
 
-def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
+def _infer(
+    files: Sequence[str], sources: Sources, answers: Answers, progress: Progress | None = None
+) -> Made:
     """Infer the programs of all files: those that are built, loose ones, then the nodes that nobody makes."""
     workspace, read = sources.workspace, dict[str, str]()
     found: list[Solved] = []
@@ -78,7 +82,7 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
             lasting, why = False, failure("the search for C++ programs", error)
             found.append(Solved(gaps=(Gap(SourceRef(files[0]), why),)))
             return []
-        answered = solve_all(sources, answers, listed)
+        answered = solve_all(sources, answers, listed, progress)
         for each in answered:
             read.update(each.files)
             lasting = lasting and each.lasting

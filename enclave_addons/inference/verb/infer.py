@@ -19,9 +19,10 @@ from enclave_addons.inference.report.comparison import lacking, to_text
 from enclave_addons.inference.report.v2_report import open_questions, program_key, to_v2
 from enclave_addons.inference.report.written import ExpandedSystem, expand
 from enclave_addons.inference.source_digest import source_digest
+from enclave_addons.inference.start import Progress
 from enclave_addons.inference.system import InferredSystem, infer_paths
 from enclave_common.command_line import FLAG, PATH, Option
-from enclave_common.terminal import printable
+from enclave_common.terminal import counted_progress, printable
 from enclave_common.words import counted, some_of
 from nodl.ament_index import PackageNotFoundError, executables, package_prefix, search_prefixes
 from nodl.lookup import ManifestLookup
@@ -43,7 +44,8 @@ OPTIONS: tuple[Option, ...] = (
 def run(args: argparse.Namespace) -> int:
     """Return 0 if nodes were found, 1 if none, 2 if a subject does not exist. Open questions go to standard error."""
     try:
-        system = _infer(args.subjects, search_prefixes(args.prefix))
+        progress = counted_progress("reading programs:", quiet=args.quiet)
+        system = _infer(args.subjects, search_prefixes(args.prefix), progress)
     except LookupError as error:
         print(f"secure-nodl infer: error: {error.args[0]}", file=sys.stderr)
         return 2
@@ -150,10 +152,10 @@ def _is_read_by_a_plan(node: NodeInterface, sources: SourcesInReach, prefixes: S
     )
 
 
-def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
+def _infer(subjects: list[str], prefixes: Sequence[str], progress: Progress | None = None) -> InferredSystem:
     """Infer paths together, so that they find each other's modules; packages by their executables."""
     paths = [subject for subject in subjects if os.path.exists(subject)]
-    found = [infer_paths(paths)] if paths else []
+    found = [infer_paths(paths, progress)] if paths else []
     found.extend(_infer_package(subject, prefixes) for subject in subjects if subject not in paths)
     return InferredSystem(
         tuple(node for each in found for node in each.nodes),

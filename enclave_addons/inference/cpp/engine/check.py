@@ -6,15 +6,18 @@ Places are found by their words in the text of the program's files, whatever the
 from __future__ import annotations
 
 import bisect
+import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from enclave_addons.inference.cpp.engine.machine import Machine
 from enclave_addons.inference.cpp.engine.sites import Site, sites_of
 from enclave_addons.inference.cpp.reading.declarations import Class, FileIndex, Function
+from enclave_addons.inference.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
 _DECLARES = ("function_declarator", "using_declaration", "template_parameter_list", "friend_declaration")
+_ADDRESS = re.compile(r"&\s*(?:\w+\s*::\s*)+(\w+)")
 _MAKING = ("call_expression", "field_initializer", "argument_list", "new_expression")
 
 
@@ -33,7 +36,7 @@ class SiteAnswer(NamedTuple):
 def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
     """Report what became of each place that has no interface and no gap of its own."""
     answers: list[SiteAnswer] = []
-    reach = reachable(run)
+    reach = reachable(run) | _taken(run)
     made = {each for cls in run.made_classes() for each in run.names.ancestry(cls)}
     for index in files:
         functions = sorted(index.all_functions, key=lambda f: f.node.start_byte)
@@ -74,6 +77,13 @@ def _answer(
     if function not in reach:
         return SiteAnswer(site, True, f"nothing in the program calls {function}")
     return SiteAnswer(site, False, f"it was not understood who calls {function}, and for which node")
+
+
+def _taken(run: Machine) -> set[Function]:
+    """Return the functions whose address code takes that was followed, and that nothing called."""
+    words = {word for function in run.called for word in _ADDRESS.findall(text(function.node))}
+    named = (each for word in words for each in run.names.functions_by_name.get(word, ()))
+    return {each for each in named if each not in run.called}
 
 
 def reachable(run: Machine) -> set[Function]:

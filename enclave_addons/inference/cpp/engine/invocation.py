@@ -32,6 +32,7 @@ from enclave_addons.inference.cpp.reading.declarations import Function, paramete
 from enclave_addons.inference.cpp.reading.type_names import NO_TYPE, Type
 from enclave_addons.inference.cpp.syntax import Node, field_of, text
 
+_CLOSURE = re.compile(r"\[[^\[\]]*\]\s*(?:\(|\{|mutable\b)")
 REPEATS = 3
 """Calls of a function with the same arguments that run in full; later ones repeat what one of them did."""
 MAX_CONTEXTS = 48
@@ -59,6 +60,7 @@ class History:
     ran: dict[object, Ran] = field(default_factory=dict)
     steps: int = 0
     written: frozenset[str] | None = None
+    keeps: bool | None = None
 
 
 def history_of(run: Machine, function: Function) -> History:
@@ -161,8 +163,18 @@ def _body(
     outcome = run.execute(function.body, frame)
     run.skips = skips
     run.store.settle(frame.mark, frame.exits, bool(outcome & NEXT))
+    if not _keeps_variables(run, function):
+        run.store.forget_locals(frame.mark)
     run.active.pop()
     return frame.returned
+
+
+def _keeps_variables(run: Machine, function: Function) -> bool:
+    """Return whether variables of a function may be used after it: by a closure, or from ``main``."""
+    history = history_of(run, function)
+    if history.keeps is None:
+        history.keeps = function.name == "main" or bool(_CLOSURE.search(text(function.node)))
+    return history.keeps
 
 
 def _bind_parameters(

@@ -96,6 +96,14 @@ class AbstractStore:
             else:
                 self._values[cell] = before
 
+    def forget_locals(self, mark: int) -> None:
+        """Forget the variables of calls that began and ended since ``mark``; their cells are numbered by the call."""
+        made = {cell for cell, before in self._trail[mark:] if before is None and isinstance(cell[0], int)}
+        if made:
+            self._trail[mark:] = [each for each in self._trail[mark:] if each[0] not in made]
+            for cell in made:
+                self._values.pop(cell, None)
+
     def merge(self, alternatives: Sequence[Changes]) -> None:
         """Go on from the present state as any of the alternatives left it."""
         for cell in dict.fromkeys(cell for each in alternatives for cell in each):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from enclave_addons.inference.cpp.reading.preprocess import Preprocessed
 from enclave_addons.inference.cpp.syntax import Node, Tree, children, field_of, line_of, text, walk
@@ -13,6 +14,17 @@ Scope = tuple[str, ...]  # namespaces and classes around a declaration
 
 
 _MENTIONED = re.compile(r"\b(?:msg|srv|action)::\w+|[A-Za-z_]\w*\b(?!\s*::(?!\s*(?:make_|[Cc]reate|Make)))")
+
+
+_CHAIN = re.compile(r"(?:([A-Za-z_]\w*)\s*(\.|->|::)\s*|(\.|->|::)\s*)?([A-Za-z_]\w*)")
+
+
+class Mention(NamedTuple):
+    """An identifier in code: behind ``.``, ``->`` or ``::`` and the identifier ``before`` that, or behind neither."""
+
+    name: str
+    link: str
+    before: str
 
 
 @dataclass(eq=False, slots=True)
@@ -49,6 +61,7 @@ class Function:
     specialises: tuple[str, ...] | None = None  # arguments as written, its own or those of its class
     overrides: bool = False  # says so
     _words: frozenset[str] | None = None
+    _mentions: frozenset[Mention] | None = None
 
     @property
     def qualified(self) -> str:
@@ -61,13 +74,25 @@ class Function:
         Types of messages stand as ``msg::String``: they are none of the classes of the same last name.
         """
         if self._words is None:
-            named = field_of(function_declarator(self.node), "declarator")
-            source, start = self.node.text or b"", self.node.start_byte
-            if named is not None:
-                source = source[: named.start_byte - start] + source[named.end_byte - start :]
-            written = _LITERAL.sub("", source.decode("utf-8", "replace"))
-            self._words = frozenset(_MENTIONED.findall(written))
+            self._words = frozenset(_MENTIONED.findall(self._without_name()))
         return self._words
+
+    @property
+    def mentions(self) -> frozenset[Mention]:
+        """Return every identifier in it but for its own name, with what it is called on."""
+        if self._mentions is None:
+            found = (match.groups("") for match in _CHAIN.finditer(self._without_name()))
+            self._mentions = frozenset(
+                Mention(name, link or chained, before) for before, link, chained, name in found
+            )
+        return self._mentions
+
+    def _without_name(self) -> str:
+        named = field_of(function_declarator(self.node), "declarator")
+        source, start = self.node.text or b"", self.node.start_byte
+        if named is not None:
+            source = source[: named.start_byte - start] + source[named.end_byte - start :]
+        return _LITERAL.sub("", source.decode("utf-8", "replace"))
 
     @property
     def constant(self) -> bool:

@@ -21,13 +21,64 @@ def test_a_program_that_is_cut_off_says_so(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr("enclave_addons.inference.cpp.engine.machine.MAX_STEPS", 3_000)
     system = infer(tmp_path, BEHIND)
     assert names(system) == ["before"]
-    assert any(why.startswith("this program is too large to be followed to its end") for why in gaps(system))
+    assert any(why.startswith("this program was given up after") for why in gaps(system))
 
 
 def test_one_that_comes_to_its_end_does_not(tmp_path: Path) -> None:
     system = infer(tmp_path, BEHIND)
     assert names(system) == ["before", "behind"]
     assert gaps(system) == []
+
+
+def test_a_method_is_not_followed_for_its_name_that_makes_interfaces_in_another_class(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``update`` of the sensor makes interfaces, that of the grid, which takes long, does not."""
+    monkeypatch.setattr("enclave_addons.inference.cpp.engine.machine.MAX_STEPS", 12_000)
+    monkeypatch.setattr("enclave_addons.inference.cpp.engine.invocation.ALLOWANCE", 1_000)
+    classes = f"""
+struct Sensor {{ void update(rclcpp::Node * node) {{ node->{PUB}("sensor", 1); }} }};
+struct Grid {{ std::string last; void update(int) {{ {LOOPS} {LOOPS} {LOOPS} {LOOPS} }} }};
+"""
+    made = (
+        f'sensor_ = std::make_unique<Sensor>(); grid_.update(1); sensor_->update(this); {PUB}("behind", 1);'
+    )
+    system = infer(tmp_path, in_class(made, "Grid grid_; std::unique_ptr<Sensor> sensor_;", classes))
+    assert names(system) == ["behind", "sensor"]
+    assert gaps(system) == []
+
+
+def test_a_callback_that_a_class_of_the_program_keeps_is_run_when_that_class_calls_it(tmp_path: Path) -> None:
+    classes = """
+struct Server {
+  std::function<void()> execute_;
+  rclcpp::TimerBase::SharedPtr timer_;
+  Server(rclcpp::Node * node, std::function<void()> execute) : execute_(execute) {
+    timer_ = node->create_wall_timer(std::chrono::seconds(1), std::bind(&Server::work, this));
+  }
+  void work() { execute_(); }
+};
+"""
+    kept = "std::shared_ptr<Server> server_;"
+    body = "server_ = std::make_shared<Server>(this, std::bind(&Demo::follow, this));"
+    method = f'void follow() {{ {PUB}("late", 1); }}'
+    system = infer(tmp_path, in_class(body, f"{method} {kept}", classes))
+    assert names(system) == ["late"]
+    assert gaps(system) == []
+
+
+def test_a_callback_that_nothing_is_seen_to_call_is_a_gap(tmp_path: Path) -> None:
+    classes = """
+struct Server {
+  void (*execute_)(rclcpp::Node *);
+  explicit Server(void (*execute)(rclcpp::Node *)) : execute_(execute) {}
+};
+"""
+    function = f'struct Late {{ static void make(rclcpp::Node * node) {{ node->{PUB}("late", 1); }} }};'
+    body = "server_ = std::make_shared<Server>(&Late::make);"
+    system = infer(tmp_path, in_class(body, "std::shared_ptr<Server> server_;", classes + function))
+    assert names(system) == []
+    assert any("Late::make" in why for why in gaps(system))
 
 
 def doubling(call: str, first: str) -> str:
