@@ -469,3 +469,17 @@ def test_what_other_descriptions_of_a_recorded_node_have_is_named_at_once(
     assert told(output) == SECRETS
     assert output.count("--also unseen grants publish /one, subscribe /two") == 2
     assert told(secured(workspace, *given, "--also", "unseen")) == set()
+
+
+def test_the_security_log_of_a_process_explains_what_its_output_does_not(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    program = Program("n", "node n\n", (), inside='<env name="STAND_IN_NODE_FAILS" value="refused"/>')
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    logs = tmp_path / "logs"
+    without = secured(workspace, "--log-security", str(logs))
+    assert logs.is_dir() and "could not join DDS: " in without, without
+    (logs / "n-1.log").write_text("[ERROR] Permissions validity period expired for CN=ros.n\n")
+    assert "could not join DDS: its permissions have expired" in secured(
+        workspace, "--log-security", str(logs)
+    )
