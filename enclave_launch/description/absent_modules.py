@@ -196,9 +196,12 @@ class _OpaqueModule(ModuleType):
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.__path__ = []
-        self.__all__ = ()  # for ``from module import *``
+        self.all_names_imported = False
 
     def __getattr__(self, name: str) -> Any:
+        if name == "__all__":  # ``from module import *``
+            self.all_names_imported = True
+            return ()
         if name.startswith("__"):
             raise AttributeError(name)
         return OpaqueValue(f"{self.__name__}.{name}", self.__name__.partition(".")[0])
@@ -243,6 +246,12 @@ class AbsentModules(Loader, MetaPathFinder):
         """Take the modules that were made up out of ``sys.modules``."""
         for name in [name for name, module in sys.modules.items() if isinstance(module, _OpaqueModule)]:
             del sys.modules[name]
+
+
+def modules_with_all_names_imported() -> list[str]:
+    """Return the modules that are not installed, and from which a launch file imports ``*``."""
+    modules = [each for each in sys.modules.values() if isinstance(each, _OpaqueModule)]
+    return sorted(module.__name__ for module in modules if module.all_names_imported)
 
 
 def _importer() -> FrameType | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from enclave_launch.description.absent_modules import modules_with_all_names_imported
 from enclave_launch.description.substitutions.computed import expression_of
 
 _OBJECT = re.compile(r"<(?:[\w.]+\.)?(?:<locals>\.)?(\w+) object at 0x[0-9a-fA-F]+>")
@@ -62,6 +63,8 @@ def _of_python(error: BaseException, text: str) -> Iterator[str]:
             f"(['a', {kind}(...)]), join paths by PathJoinSubstitution, or read it in an OpaqueFunction by "
             ".perform(context)"
         )
+    elif isinstance(error, NameError) and (modules := modules_with_all_names_imported()):
+        yield f"it may be a name of {', '.join(modules)}, which is not installed: the file imports * from it"
     elif isinstance(error, AttributeError) and _NO_DESCRIPTION in text:
         yield "generate_launch_description() must return a LaunchDescription"
     elif isinstance(error, AttributeError) and (found := _NO_ENTITY.search(text)):

@@ -187,6 +187,17 @@ def test_an_import_by_an_installed_library_keeps_its_error(tree: Evaluate) -> No
         tree("pass", "import importlib\nimportlib.import_module('robot_common')")
 
 
+def test_a_name_that_a_star_may_have_brought_is_refused_with_the_module(tree: Evaluate) -> None:
+    tree("pass", "from robot_common.names import *")
+    with pytest.raises(EvaluationError) as caught:
+        tree("somewhere()", "from robot_common.names import *")
+    assert "name 'somewhere' is not defined" in str(caught.value)
+    assert "it may be a name of robot_common.names, which is not installed" in str(caught.value)
+    with pytest.raises(EvaluationError) as other:
+        tree("somewhere()", "import robot_common.names")
+    assert "it may be" not in str(other.value)
+
+
 def test_rclpy_is_opaque_beside_its_loggers(tree: Evaluate) -> None:
     body = (
         "rclpy.logging.get_logger('x').info('y')\ndescription.add_action(Node(package='pk', executable='e'))"
