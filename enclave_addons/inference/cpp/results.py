@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import pairwise
 
@@ -10,6 +9,7 @@ from enclave_addons.inference.cpp.engine.values import NodeNamePart, Text, Value
 from enclave_addons.inference.cpp.entry import FixedMapping
 from enclave_addons.inference.cpp.findings import AllocatedNode, PossibleEndpoint
 from enclave_addons.inference.cpp.program import ProgramFindings
+from enclave_addons.inference.kernel.findings import Gaps
 from enclave_addons.inference.kernel.results import UNDECIDED, certainty_of, own_name
 from enclave_addons.inference.start import Start
 from nodl.dependence import Dependence, Variation, When
@@ -24,7 +24,6 @@ from nodl.node_interface import (
     NodeInterface,
 )
 from nodl.remap import InvalidRemapRuleError, parse_rule
-from nodl.source_ref import SourceRef
 
 
 def interfaces_of(
@@ -48,29 +47,11 @@ def interfaces_of(
     return [each._replace(gaps=grouped(each.gaps)) for each in found]
 
 
-MAX_CAUSES = 10
-"""More gaps with different causes are one: the program is not followed."""
-_SHOWN = 3
-
-
 def grouped(gaps: Sequence[Gap]) -> tuple[Gap, ...]:
     """Return one gap for each cause, with the number of its places and the first of them."""
-    places: dict[str, dict[SourceRef, None]] = {}
-    for gap in gaps:
-        places.setdefault(gap.why, {}).setdefault(gap.source)
-    if len(places) > MAX_CAUSES:
-        why, first = next(iter(places.items()))
-        number = sum(map(len, places.values()))
-        cure = "write its interfaces in a manifest, or record it"
-        return (
-            Gap(next(iter(first)), f"this program is not followed: {number} places, first: {why} ({cure})"),
-        )
-    return tuple(_of_cause(why, list(found)) for why, found in places.items())
-
-
-def _of_cause(why: str, places: Sequence[SourceRef]) -> Gap:
-    others = ", ".join(f"{os.path.basename(each.file)}:{each.line}" for each in places[1:_SHOWN])
-    return Gap(places[0], f"{why} ({len(places)} places, also {others})" if others else why)
+    causes = Gaps()
+    causes.include(gaps)
+    return tuple(causes.listed())
 
 
 def _unreached(record: AllocatedNode, findings: ProgramFindings) -> set[str]:
