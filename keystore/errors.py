@@ -38,7 +38,7 @@ class InvalidEnclaveNameError(KeystoreError, ValueError):
     def __init__(self, name: str, reason: str):
         self.name = name
         self.reason = reason
-        super().__init__(f"{printable(name)} is not an enclave name: {reason}")
+        super().__init__(f"{quoted(name)} is not an enclave name: {reason}")
 
 
 class EnclaveTooDeep(InvalidEnclaveNameError):
@@ -91,7 +91,7 @@ class StorageError(KeystoreError):
     @classmethod
     def of(cls, error: OSError, doing: str) -> StorageError:
         """Return the error of the keystore for ``error``; ``doing`` is a phrase such as ``writing the keystore``."""
-        place = f" {printable(str(error.filename))}" if error.filename else ""
+        place = f" {quoted(str(error.filename))}" if error.filename else ""
         reason = error.strerror or error
         only_read = doing.split()[0] in ("reading", "looking", "checking", "asking")
         after = "" if only_read else "; no file was left half-written: fix this and run it again"
@@ -105,7 +105,3 @@ def storage_errors(doing: str) -> Iterator[None]:
         yield
     except OSError as error:
         raise StorageError.of(error, doing) from None
-
-
-printable = quoted
-"""Of names from outside, which may hold escape sequences."""

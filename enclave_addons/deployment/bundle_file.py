@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.files import read_bytes
+from enclave_common.terminal import quoted
 from keystore.disk import layout
-from keystore.errors import DamagedKeystoreError, printable, storage_errors
+from keystore.errors import DamagedKeystoreError, storage_errors
 from keystore.formats.bundle import Manifest
 from keystore.formats.role import Role
 
@@ -68,7 +69,7 @@ def read_bundle(bundle: Path) -> SealedBundle:
     """Read a bundle. Raises DamagedKeystoreError, StorageError."""
     with storage_errors("reading the bundle"):
         content = read_bytes(bundle, MAX_BUNDLE)
-    return sealed_bundle(content, printable(bundle))
+    return sealed_bundle(content, quoted(bundle))
 
 
 def sealed_bundle(content: bytes, place: str) -> SealedBundle:

@@ -14,13 +14,14 @@ from typing import NamedTuple
 
 from enclave_addons.deployment.bundle_file import read_bundle
 from enclave_addons.deployment.host_bundles import SUFFIX, last_signed
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.deployed import find_differences, read_manifest
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import own_permissions_cas
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, KeystoreError, printable, storage_errors
+from keystore.errors import InvalidInputError, KeystoreError, storage_errors
 from keystore.formats.bundle import Manifest
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register
@@ -122,7 +123,7 @@ def _sources(places: Iterable[Path | str]) -> Iterator[Path]:
 
 def _manifest(place: Path, reference: Reference | None) -> Manifest:
     signed = read_bundle(place).signed if place.is_file() else safe_files.read(place, layout.BUNDLE)
-    return read_manifest(signed, printable(place), reference.signers if reference is not None else None)
+    return read_manifest(signed, quoted(place), reference.signers if reference is not None else None)
 
 
 def _judge(

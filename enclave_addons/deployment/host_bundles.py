@@ -15,6 +15,7 @@ from pathlib import Path
 from enclave_addons.deployment.bundle_file import bundle_bytes, read_bundle
 from enclave_addons.deployment.hosts import Hosts, refuse_host_name
 from enclave_addons.deployment.public_files import files_of, refuse_unfit
+from enclave_common.terminal import quoted
 from enclave_common.words import some_of
 from keystore.disk import layout, safe_files, store
 from keystore.disk.crl_file import crl_number, crl_validity, forgotten, listed_in
@@ -22,7 +23,7 @@ from keystore.disk.register_file import read_register
 from keystore.disk.store import Content, Store, write_new
 from keystore.disk.versions import written_aside
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, KeystoreError, UnsafeKeystoreError, printable, storage_errors
+from keystore.errors import InvalidInputError, KeystoreError, UnsafeKeystoreError, storage_errors
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin
 from keystore.formats.certificate import read_certificate
 from keystore.formats.register import Register
@@ -146,12 +147,12 @@ def _refuse_forgotten(earlier: Path, view: KeystoreView) -> None:
         listed = sealed.opened(manifest).get(layout.CRL, b"")
     except KeystoreError:
         return  # there is none, or a file that no host would import
-    known = listed_in(listed, issuers, printable(earlier))
+    known = listed_in(listed, issuers, quoted(earlier))
     present = listed_in(safe_files.read_if_there(view.root, layout.CRL) or b"", issuers, layout.CRL)
     if missing := forgotten(known, present):
         serials = some_of([f"{serial:X}" for serial in missing], 8)
         raise UnsafeKeystoreError(
-            f"the CRL of this keystore does not list {serials}, which {printable(earlier)} lists as revoked: the "
+            f"the CRL of this keystore does not list {serials}, which {quoted(earlier)} lists as revoked: the "
             f"keystore was restored from a backup. Take the list of host {manifest.host} over, its public/crl.pem: "
             f"secure-keystore renew {shlex.quote(str(view.root))} --adopt-crl FILE"
         )
@@ -163,7 +164,7 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
     signed = safe_files.read_if_there(view.root, relative)
     if signed is None:
         return None
-    place = printable(view.root / relative)
+    place = quoted(view.root / relative)
     document = smime.read(signed, place)
     manifest = parse_manifest(document.document, place)
     if not document.embeds(view.ca(Role.PERMISSIONS).der):
@@ -232,7 +233,7 @@ def _bundled(enclave: str, files: Mapping[str, Content]) -> BundledEnclave:
 def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
     target = output / f"{host}{SUFFIX}"
     if Path(os.path.realpath(output)).is_relative_to(root):
-        raise InvalidInputError(f"{printable(output)} lies in the keystore; choose another place")
+        raise InvalidInputError(f"{quoted(output)} lies in the keystore; choose another place")
     with storage_errors("writing the bundle"):
         output.mkdir(parents=True, exist_ok=True)
         with written_aside(target) as aside:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.dependencies import require
+from enclave_common.terminal import quoted
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.store import write_new
 from keystore.disk.versions import Versions
@@ -28,7 +29,6 @@ from keystore.errors import (
     SigningUnavailableError,
     StorageError,
     UnsafeKeystoreError,
-    printable,
     storage_errors,
 )
 from keystore.formats.bundle import BundledEnclave
@@ -142,7 +142,7 @@ def parse_requests(text: bytes, place: str) -> tuple[Request, ...]:
         Request(
             validate_enclave_name(name.decode("utf-8", "replace")),
             fingerprint(
-                request_key(pem, f"{place}: the request of {printable(name.decode('utf-8', 'replace'))}").spki
+                request_key(pem, f"{place}: the request of {quoted(name.decode('utf-8', 'replace'))}").spki
             ),
             pem,
         )
@@ -165,7 +165,7 @@ def find_key(versions: Versions, wanted: BundledEnclave) -> HostKey:
                 return HostKey(name, data)
     raise UnsafeKeystoreError(
         f"the certificate of enclave {wanted.enclave} in this bundle is for a key that is not on this host; make a "
-        f"new request here: secure-keystore request {printable(versions.root)} {wanted.enclave}"
+        f"new request here: secure-keystore request {quoted(versions.root)} {wanted.enclave}"
     )
 
 

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 from enclave_addons.deployment.units import Unit, in_restart_order, parse_unit
 from enclave_common.terminal import printable as printable_line
+from enclave_common.terminal import quoted
 from keystore.disk.store import write_new
 from keystore.disk.versions import written_aside
-from keystore.errors import InvalidInputError, StorageError, printable, storage_errors
+from keystore.errors import InvalidInputError, StorageError, storage_errors
 from keystore.formats.bundle import Manifest
 
 UNITS = Path("/etc/systemd/system")
@@ -75,7 +76,7 @@ def chosen_units(units: Sequence[Unit], names: Iterable[str]) -> list[Unit]:
         if not any(unit.is_called(name) for unit in processes):
             known = ", ".join(unit.name.removesuffix(".service") for unit in processes) or "none"
             raise InvalidInputError(
-                f"no installed unit, node or enclave is called {printable(name)}; there are {known}"
+                f"no installed unit, node or enclave is called {quoted(name)}; there are {known}"
             )
     return [unit for unit in processes if not wanted or any(map(unit.is_called, wanted))]
 
@@ -94,7 +95,7 @@ def install(folder: Path, options: UnitOptions | None = None) -> Installed:
     targets = [name for name in brought if name.endswith(".target")]
     if len(targets) != 1:
         raise InvalidInputError(
-            f"{printable(folder)} is not the folder of one host that secure-plan export --format systemd wrote"
+            f"{quoted(folder)} is not the folder of one host that secure-plan export --format systemd wrote"
         )
     (target,) = targets
     present = {unit.name: text for unit, text in _generated(chosen.units) if unit.target == target}
@@ -102,7 +103,7 @@ def install(folder: Path, options: UnitOptions | None = None) -> Installed:
     removed = sorted(set(present) - set(brought))
     for name in changed:
         if name not in present and os.path.lexists(chosen.units / name):
-            raise InvalidInputError(f"{printable(chosen.units / name)} was not generated; it is left alone")
+            raise InvalidInputError(f"{quoted(chosen.units / name)} was not generated; it is left alone")
     if removed:
         _systemctl("stop", *removed)
     parameters = chosen.parameters / target.removesuffix(".target") / "parameters"
@@ -123,7 +124,7 @@ def uninstall(name: str, options: UnitOptions | None = None) -> Installed:
     target = f"{name.removesuffix('.target')}.target"
     names = [unit.name for unit in installed_units(chosen) if unit.target == target]
     if target not in names:
-        raise InvalidInputError(f"no target {printable(target)} of ours is installed in {chosen.units}")
+        raise InvalidInputError(f"no target {quoted(target)} of ours is installed in {chosen.units}")
     _systemctl("disable", target)
     _systemctl("stop", *names)
     with storage_errors("removing units"):

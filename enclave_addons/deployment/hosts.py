@@ -17,7 +17,8 @@ from typing import NamedTuple, Optional
 from pydantic import Field, StrictBool, StrictStr
 
 from enclave_common.strict_yaml import Strict, StrictDocument
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 from keystore.formats.bundle import refuse_host_name as refuse_host_name
 from keystore.formats.given_file import read_given
 from keystore.formats.given_yaml import parse_given
@@ -129,10 +130,10 @@ def parse_hosts(text: bytes, where: str) -> Hosts:
 
 def _check(one: Needs, where: str) -> None:
     if one.memory is not None and not _MEMORY.match(one.memory):
-        raise InvalidInputError(f"{where}: memory: {printable(one.memory)} is not a size such as 256Mi")
+        raise InvalidInputError(f"{where}: memory: {quoted(one.memory)} is not a size such as 256Mi")
     for device in one.devices:
         if not _DEVICE.match(device) or ".." in device:
-            raise InvalidInputError(f"{where}: devices: {printable(device)} is not a path below /dev")
+            raise InvalidInputError(f"{where}: devices: {quoted(device)} is not a path below /dev")
     for group in one.groups:
         if not _GROUP.match(group):
-            raise InvalidInputError(f"{where}: groups: {printable(group)} is not a group's name or number")
+            raise InvalidInputError(f"{where}: groups: {quoted(group)} is not a group's name or number")

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from enclave_addons.deployment.bundle_file import SealedBundle, read_bundle
 from enclave_addons.deployment.host_keys import HostKey, find_key, forget_pending
+from enclave_common.terminal import quoted
 from enclave_common.words import some_of
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.container_copies import (
@@ -32,13 +33,7 @@ from keystore.disk.deployed import differing_files, read_manifest
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
 from keystore.disk.view import KeystoreView
-from keystore.errors import (
-    DamagedKeystoreError,
-    InvalidInputError,
-    KeystoreError,
-    UnsafeKeystoreError,
-    printable,
-)
+from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, UnsafeKeystoreError
 from keystore.formats.bundle import BundledEnclave, Manifest, parse_handover, parse_manifest, pins_of
 from keystore.formats.certificate import read_certificates
 from keystore.formats.governance import parse_governance
@@ -136,7 +131,7 @@ def parse_owner(text: str) -> ContainerUser:
     """Return the owner that ``UID:GID`` names. Raises InvalidInputError."""
     uid, _, gid = text.partition(":")
     if not (uid.isdecimal() and gid.isdecimal()):
-        raise InvalidInputError(f"--owner {printable(text)} is not UID:GID in numbers, such as 10001:10001")
+        raise InvalidInputError(f"--owner {quoted(text)} is not UID:GID in numbers, such as 10001:10001")
     return ContainerUser(int(uid), int(gid))
 
 
@@ -148,7 +143,7 @@ def _present(version: Path | None, host: str | None) -> Manifest | None:
     if version is None:
         return None
     try:
-        return read_manifest(safe_files.read(version, layout.BUNDLE), printable(version / layout.BUNDLE))
+        return read_manifest(safe_files.read(version, layout.BUNDLE), quoted(version / layout.BUNDLE))
     except DamagedKeystoreError:
         with suppress(KeystoreError):
             view = KeystoreView(version)
@@ -248,7 +243,7 @@ def _check_files(found: _Bundle) -> None:
         enclaves, crl=layout.CRL in manifest.files, handover=layout.HANDOVER in manifest.files
     )
     for name in sorted(set(manifest.files) ^ expected):
-        raise DamagedKeystoreError(f"{place}: its list of files does not fit its enclaves: {printable(name)}")
+        raise DamagedKeystoreError(f"{place}: its list of files does not fit its enclaves: {quoted(name)}")
     for name in sorted(set(found.files) ^ expected):
         raise UnsafeKeystoreError(f"{place}: {name} is not as its manifest says")
     for name, digest in sorted(manifest.files.items()):
@@ -300,7 +295,7 @@ def _refuse_forgotten(found: _Bundle, present: KeystoreView) -> None:
         raise UnsafeKeystoreError(
             f"{found.place}: its CRL does not list {listed}, which this host "
             "knows as revoked: the CA machine was restored from a backup. Take this host's list over there, "
-            f"secure-keystore renew KEYSTORE --adopt-crl FILE with {printable(present.root / layout.CRL)}, and export "
+            f"secure-keystore renew KEYSTORE --adopt-crl FILE with {quoted(present.root / layout.CRL)}, and export "
             "again"
         )
 

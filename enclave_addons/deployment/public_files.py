@@ -10,12 +10,13 @@ from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import archive_bytes
 from keystore.disk.store import Content, Link, write_new
 from keystore.disk.versions import write_tree, written_aside
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, InvalidInputError, printable, storage_errors
+from keystore.errors import DamagedKeystoreError, InvalidInputError, storage_errors
 from keystore.formats.validity import utc_now
 from keystore.verification import Finding, Severity, verify
 
@@ -52,9 +53,9 @@ def export(
         files |= _public_files(view, name, public)
     target = Path(output)
     if target.exists() or target.is_symlink():
-        raise InvalidInputError(f"{printable(target)} exists already; choose a new name or remove it")
+        raise InvalidInputError(f"{quoted(target)} exists already; choose a new name or remove it")
     if Path(os.path.realpath(target)).is_relative_to(view.root):
-        raise InvalidInputError(f"{printable(target)} lies in the keystore; choose another place")
+        raise InvalidInputError(f"{quoted(target)} lies in the keystore; choose another place")
     with storage_errors("writing the bundle"):
         _write(target, files)
     return tuple(names)

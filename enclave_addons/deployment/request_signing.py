@@ -7,10 +7,11 @@ from datetime import datetime
 from pathlib import Path
 
 from enclave_addons.deployment.host_keys import Request
+from enclave_common.terminal import quoted
 from keystore.disk import layout
 from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link, enclave_links
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, printable
+from keystore.errors import InvalidInputError
 from keystore.formats.certificate import CertificateFacts, given_certificates
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -164,13 +165,13 @@ def _is_signed(view: KeystoreView, register: Register, one: Request) -> bool:
 def _refuse_unfit(view: KeystoreView, register: Register, one: Request) -> None:
     if one.enclave not in view.enclaves():
         raise InvalidInputError(
-            f"no enclave {one.enclave} in {printable(view.root)}; give it its permissions first (secure-launch, "
+            f"no enclave {one.enclave} in {quoted(view.root)}; give it its permissions first (secure-launch, "
             "apply-policy or create-enclave)"
         )
     requested = request_key(one.pem, f"the request of {one.enclave}")
     if not names_enclave(requested.common_name, one.enclave):
         raise InvalidInputError(
-            f"the request of {one.enclave} names {printable(requested.common_name)}, another enclave's subject"
+            f"the request of {one.enclave} names {quoted(requested.common_name)}, another enclave's subject"
         )
     _refuse_taken_key(register, one)
 

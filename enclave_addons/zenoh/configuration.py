@@ -17,7 +17,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from enclave_addons.zenoh.rules import AccessRule
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 
 OPEN_TIMEOUT_MS = 30_000
 """How long a process looks for the router before it ends with an error. Zenoh's default gives up at once."""
@@ -169,9 +170,7 @@ class RouterAddress(NamedTuple):
         match = _ADDRESS.match(text)
         port = int(match[3] or DEFAULT_PORT) if match else 0
         if match is None or not 0 < port < 65536 or len(match[1] or match[2]) > 253:
-            raise InvalidInputError(
-                f"{printable(text)} is not where a router can be; write HOST or HOST:PORT"
-            )
+            raise InvalidInputError(f"{quoted(text)} is not where a router can be; write HOST or HOST:PORT")
         return cls(match[1] or match[2], port)
 
     def __str__(self) -> str:

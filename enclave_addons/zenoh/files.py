@@ -25,13 +25,14 @@ from enclave_addons.zenoh.configuration import (
 from enclave_addons.zenoh.grants import grants_of_topics
 from enclave_addons.zenoh.rules import access_rules
 from enclave_addons.zenoh.types import types_of_shares
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.register_file import read_register
 from keystore.disk.share_files import read_shares
 from keystore.disk.signed_documents import own_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.compact import expanded
 from keystore.formats.permissions_document import parse_permissions
@@ -77,7 +78,7 @@ def present_address(view: KeystoreView) -> RouterAddress | None:
         return RouterAddress.parse(str(json.loads(text)["metadata"]["address"]))
     except (ValueError, KeyError, TypeError, RecursionError, InvalidInputError):
         raise DamagedKeystoreError(
-            f"{printable(view.root / layout.ZENOH_ROUTER)} was not written by secure-keystore; remove it, and run "
+            f"{quoted(view.root / layout.ZENOH_ROUTER)} was not written by secure-keystore; remove it, and run "
             "secure-keystore zenoh"
         ) from None
 
@@ -118,7 +119,7 @@ def identity_problem(view: KeystoreView, due: datetime) -> str | None:
     pem = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER_CERT)
     if pem is None:
         return "its certificate is missing"
-    facts, ca = read_certificate(pem, printable(view.root / layout.ZENOH_ROUTER_CERT)), view.ca(Role.IDENTITY)
+    facts, ca = read_certificate(pem, quoted(view.root / layout.ZENOH_ROUTER_CERT)), view.ca(Role.IDENTITY)
     if facts.common_name != ROUTER_NAME or not issued_by(facts, ca):
         return "its certificate is not one that the identity CA issued for a router"
     if facts.validity.not_after < min(due, ca.validity.not_after):
@@ -146,15 +147,15 @@ def _subject(
 ) -> tuple[Subject, tuple[str, ...]]:
     """Return the enclave with its rules and gaps; raises a KeystoreError if it must not be served."""
     cert, place = (layout.enclave_file(enclave, name) for name in (layout.CERT, layout.PERMISSIONS))
-    facts = read_certificate(safe_files.read(view.root, cert), printable(view.root / cert))
+    facts = read_certificate(safe_files.read(view.root, cert), quoted(view.root / cert))
     name = _common_name(register, revoked, enclave, facts)
     document = own_document(view, place)
     last = register.permissions(enclave) if register is not None else None
     if last is not None and last.document != hashlib.sha256(document).hexdigest():
-        raise DamagedKeystoreError(f"{printable(view.root / place)} is not what was signed last for it")
-    permissions = parse_permissions(document, printable(view.root / place))
+        raise DamagedKeystoreError(f"{quoted(view.root / place)} is not what was signed last for it")
+    permissions = parse_permissions(document, quoted(view.root / place))
     if permissions.subject != subject_name(name):
-        raise DamagedKeystoreError(f"{printable(view.root / place)} is not for {subject_name(name)}")
+        raise DamagedKeystoreError(f"{quoted(view.root / place)} is not for {subject_name(name)}")
     types = types_of_shares(enclave, read_shares(view.root, enclave)) if register is not None else {}
     rules = expanded(permissions.rules)
     grants = grants_of_topics(rules.allow, rules.deny, types)

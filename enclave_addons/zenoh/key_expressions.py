@@ -17,7 +17,7 @@ import re
 from collections.abc import Iterable, Iterator
 from itertools import pairwise, product
 
-from keystore.errors import printable
+from enclave_common.terminal import quoted
 from keystore.formats.domains import Domains
 from keystore.formats.policy import PolicyError
 
@@ -52,14 +52,12 @@ def name_expressions(name: str) -> tuple[str, ...]:
     if "*" not in name and "?" not in name and "[" not in name:
         return (name[1:],)
     if "?" in name or "[" in name:
-        raise NotExpressible(
-            f"{printable(name)}: Zenoh has no counterpart of ? and [...]; name them one by one"
-        )
+        raise NotExpressible(f"{quoted(name)}: Zenoh has no counterpart of ? and [...]; name them one by one")
     pieces = re.split(r"\*+", name)
     stars = [_star(before, after) for before, after in pairwise(pieces)]
     if sum(len(star) > 1 for star in stars) > _MOST_STARS:
         raise NotExpressible(
-            f"{printable(name)}: more than {_MOST_STARS} * inside of its parts; name them one by one"
+            f"{quoted(name)}: more than {_MOST_STARS} * inside of its parts; name them one by one"
         )
     texts = ("".join(map("".join, zip(pieces, (*chosen, ""), strict=True))) for chosen in product(*stars))
     return tuple(sorted({_canonical(text[1:]) for text in texts}))

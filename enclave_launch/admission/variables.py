@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from enclave_common.environment import domain_id
 from enclave_common.files import text_or_nothing
+from enclave_common.terminal import quoted
 from enclave_launch.errors import UsageError
-from keystore.errors import printable
 from keystore.formats.domains import HIGHEST_ID
 
 DOMAIN = "ROS_DOMAIN_ID"
@@ -149,5 +149,5 @@ def domain_of(environment: Mapping[str, str]) -> int:
     text = environment.get(DOMAIN, "")
     domain = domain_id(text)
     if domain is None or domain > HIGHEST_ID:
-        raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
+        raise UsageError(f"{DOMAIN} is {quoted(text)}, not a domain id from 0 to {HIGHEST_ID}")
     return domain

@@ -12,9 +12,10 @@ from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.serialization import Encoding
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, printable
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import NOT_OUR_FORM, UNREADABLE, CertificateFacts, time_of
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -116,7 +117,7 @@ def forgotten(known: ListedCrl | None, coming: ListedCrl | None) -> tuple[int, .
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
     """Read the CRL. Raises DamagedKeystoreError unless the file is exactly a CRL that the identity CA signed."""
     return read_crl(
-        safe_files.read(view.root, layout.CRL), view.ca(Role.IDENTITY), printable(view.root / layout.CRL)
+        safe_files.read(view.root, layout.CRL), view.ca(Role.IDENTITY), quoted(view.root / layout.CRL)
     )
 
 

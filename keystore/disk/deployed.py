@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.versions import imported_at
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError
 from keystore.formats.bundle import Manifest, parse_manifest
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.role import Role
@@ -30,9 +31,9 @@ def deployed_manifest(view: KeystoreView) -> Manifest | None:
         return None
     if signed is None:
         raise DamagedKeystoreError(
-            f"{printable(view.root / layout.BUNDLE)} is missing, so it is unknown what was imported"
+            f"{quoted(view.root / layout.BUNDLE)} is missing, so it is unknown what was imported"
         )
-    return read_manifest(signed, printable(view.root / layout.BUNDLE), view.ca_bundle(Role.PERMISSIONS))
+    return read_manifest(signed, quoted(view.root / layout.BUNDLE), view.ca_bundle(Role.PERMISSIONS))
 
 
 def differing_files(
@@ -61,7 +62,7 @@ def deployment_problem(view: KeystoreView, enclaves: Iterable[str]) -> str | Non
     if manifest is None:
         return None
     first = next(differing_files(view, manifest, enclaves), None)
-    return f"{printable(view.root / first[0])} {first[1]}" if first is not None else None
+    return f"{quoted(view.root / first[0])} {first[1]}" if first is not None else None
 
 
 def refuse_changed_deployment(view: KeystoreView, enclaves: Iterable[str]) -> None:

@@ -17,8 +17,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout
-from keystore.errors import KeystoreBusyError, StorageError, UnsafeKeystoreError, printable, storage_errors
+from keystore.errors import KeystoreBusyError, StorageError, UnsafeKeystoreError, storage_errors
 from keystore.formats.validity import iso, utc_now
 
 DEFAULT_TIMEOUT = 30.0
@@ -59,7 +60,7 @@ def _refuse_strange(path: Path, info: os.stat_result) -> None:
     """Refuse a hard link: we write in the file, and it would be another file of ours."""
     if not stat.S_ISREG(info.st_mode) or info.st_nlink > 1:
         raise UnsafeKeystoreError(
-            f"{printable(path)} is not a file of its own, but a device or a hard link; "
+            f"{quoted(path)} is not a file of its own, but a device or a hard link; "
             f"remove it: rm {shlex.quote(str(path))}"
         )
 
@@ -89,7 +90,7 @@ def _wait(descriptor: int, root: Path, timeout: float, deadline: float) -> None:
 def _busy(descriptor: int, root: Path, timeout: float) -> KeystoreBusyError:
     holder = os.pread(descriptor, 256, 0).decode("utf-8", "replace").strip() or "another process"
     return KeystoreBusyError(
-        f"{printable(root)} is in use by {printable(holder)}; waited {timeout:g} s. Try again when it is done"
+        f"{quoted(root)} is in use by {quoted(holder)}; waited {timeout:g} s. Try again when it is done"
     )
 
 

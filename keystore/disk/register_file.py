@@ -7,9 +7,10 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import UnsafeKeystoreError, printable
+from keystore.errors import UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register, parse_register
 from keystore.formats.role import Role
@@ -23,7 +24,7 @@ def read_register(root: Path) -> Register | None:
     if not os.path.lexists(f"{root}/{layout.REGISTER}"):
         return None
     text = safe_files.read_private(root, layout.REGISTER)
-    return _parsed(text, printable(root / layout.REGISTER))
+    return _parsed(text, quoted(root / layout.REGISTER))
 
 
 def needs_register(view: KeystoreView) -> bool:
@@ -53,10 +54,10 @@ def refuse_foreign_authorities(view: KeystoreView, register: Register | None) ->
     Whoever holds the key of such a CA can make enclaves that Fast DDS lets in.
     """
     for role, ca in foreign_authorities(view, register):
-        place = printable(view.root / layout.ca_cert(role))
+        place = quoted(view.root / layout.ca_cert(role))
         raise UnsafeKeystoreError(
             f"{place} holds a CA that this keystore did not make, or has retired: {describe(ca)}. Find out who put it "
-            f"there; to remove it: secure-keystore renew {printable(view.root)}"
+            f"there; to remove it: secure-keystore renew {quoted(view.root)}"
         )
 
 
@@ -64,4 +65,4 @@ def describe(ca: CertificateFacts) -> str:
     """Return its name and the SHA-256 fingerprint that openssl and browsers show."""
     digest = hashlib.sha256(ca.der).hexdigest().upper()
     pairs = ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
-    return f"{printable(ca.common_name or 'without a common name')}, SHA-256 {pairs}"
+    return f"{quoted(ca.common_name or 'without a common name')}, SHA-256 {pairs}"

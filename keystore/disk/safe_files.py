@@ -9,14 +9,9 @@ import stat
 from collections.abc import Iterable
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout
-from keystore.errors import (
-    DamagedKeystoreError,
-    NotAKeystoreError,
-    StorageError,
-    UnsafeKeystoreError,
-    printable,
-)
+from keystore.errors import DamagedKeystoreError, NotAKeystoreError, StorageError, UnsafeKeystoreError
 
 _MAX_FILE = 8_000_000
 _MAX_OF_ALL = 200_000_000  # of a file that speaks of every enclave
@@ -28,7 +23,7 @@ def resolve_root(keystore: Path | str) -> Path:
     try:
         return Path(os.path.realpath(keystore))
     except ValueError:
-        raise NotAKeystoreError(f"{printable(keystore)} is not a path") from None
+        raise NotAKeystoreError(f"{quoted(keystore)} is not a path") from None
 
 
 def folders_of_links(keystore: Path | str) -> list[Path]:
@@ -50,7 +45,7 @@ def read(root: Path, relative: str) -> bytes:
     try:
         return _read(root, relative)
     except FileNotFoundError:
-        raise DamagedKeystoreError(f"{printable(root / relative)} is missing") from None
+        raise DamagedKeystoreError(f"{quoted(root / relative)} is missing") from None
     except OSError as error:
         raise StorageError.of(error, "reading the keystore") from None
 
@@ -77,13 +72,13 @@ def _read(root: Path, relative: str) -> bytes:
     try:
         info = os.fstat(descriptor)
         if not stat.S_ISREG(info.st_mode):
-            raise UnsafeKeystoreError(f"{printable(root / relative)} is not a regular file; remove it")
+            raise UnsafeKeystoreError(f"{quoted(root / relative)} is not a regular file; remove it")
         limit = _MAX_OF_ALL if relative in (layout.REGISTER, layout.ZENOH_ROUTER) else _MAX_FILE
         if info.st_size > limit:
-            raise DamagedKeystoreError(f"{printable(root / relative)} is larger than {limit} bytes")
+            raise DamagedKeystoreError(f"{quoted(root / relative)} is larger than {limit} bytes")
         content = os.read(descriptor, info.st_size + 1)
         if len(content) != info.st_size:
-            raise DamagedKeystoreError(f"{printable(root / relative)} changed while it was read; try again")
+            raise DamagedKeystoreError(f"{quoted(root / relative)} changed while it was read; try again")
         return content
     finally:
         os.close(descriptor)
@@ -107,7 +102,7 @@ def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystoreError:
     """Return the error for a link that no keystore has, with the command that removes it."""
     path = root / relative
     return UnsafeKeystoreError(
-        f"{printable(path)} is a link to {printable(target)}, which no keystore has there; "
+        f"{quoted(path)} is a link to {quoted(target)}, which no keystore has there; "
         f"look at it and remove it: rm {shlex.quote(str(path))}"
     )
 
@@ -154,7 +149,7 @@ def refuse_unsafe_private_directories(root: Path) -> None:
         info = os.lstat(path)
         if info.st_mode & _WRITABLE_BY_OTHERS:
             raise UnsafeKeystoreError(
-                f"{printable(path)} can be written by others (mode {mode_text(info)}); for the whole keystore: "
+                f"{quoted(path)} can be written by others (mode {mode_text(info)}); for the whole keystore: "
                 f"{close_to_others(root)}"
             )
 
@@ -165,12 +160,10 @@ def private_problem(path: Path | str, info: os.stat_result) -> str | None:
         return None
     if info.st_uid != os.geteuid():
         return (
-            f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
+            f"{quoted(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
             f"user, or take it over: {private_repair(path, info)}"
         )
-    return (
-        f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
-    )
+    return f"{quoted(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
 
 
 def is_trusted_owner(info: os.stat_result) -> bool:
@@ -196,7 +189,7 @@ def refuse_foreign_owner(root: Path, enclaves: Iterable[str]) -> None:
         if not is_trusted_owner(info):
             place = root / relative
             raise UnsafeKeystoreError(
-                f"{printable(place)} belongs to user {info.st_uid}, who can change it at any time: run as that user, "
+                f"{quoted(place)} belongs to user {info.st_uid}, who can change it at any time: run as that user, "
                 f"or take the keystore over: chown -R {os.geteuid()} {shlex.quote(str(root))}"
             )
 
@@ -208,10 +201,10 @@ def close_to_others(root: Path) -> str:
 
 def private_repair(path: Path | str, info: os.stat_result) -> str:
     """Return the command that makes ``path`` ours (if someone else owns it) or closes it to others."""
-    quoted = shlex.quote(str(path))
+    word = shlex.quote(str(path))
     if info.st_uid != os.geteuid():
-        return f"chown -R {os.geteuid()} {quoted}"
-    return f"chmod go-rwx {quoted}"
+        return f"chown -R {os.geteuid()} {word}"
+    return f"chmod go-rwx {word}"
 
 
 def refuse_unsafe_directory(path: Path) -> None:
@@ -220,14 +213,14 @@ def refuse_unsafe_directory(path: Path) -> None:
         info = os.lstat(path)
     except OSError as error:
         raise StorageError.of(error, "looking at the directory") from None
-    quoted = shlex.quote(str(path))
+    word = shlex.quote(str(path))
     if stat.S_ISLNK(info.st_mode) or not stat.S_ISDIR(info.st_mode):
-        raise UnsafeKeystoreError(f"{printable(path)} is not a directory (a link?); remove it: rm {quoted}")
+        raise UnsafeKeystoreError(f"{quoted(path)} is not a directory (a link?); remove it: rm {word}")
     if info.st_uid != os.geteuid():
         raise UnsafeKeystoreError(private_problem(path, info) or "")
     if info.st_mode & stat.S_IWOTH:
         raise UnsafeKeystoreError(
-            f"everybody can write in {printable(path)} (mode {mode_text(info)}): chmod o-w {quoted}"
+            f"everybody can write in {quoted(path)} (mode {mode_text(info)}): chmod o-w {word}"
         )
 
 
@@ -236,7 +229,7 @@ def refuse_unsafe_parent(root: Path) -> None:
     info = os.stat(root.parent)
     if info.st_mode & stat.S_IWOTH and not info.st_mode & stat.S_ISVTX:
         raise UnsafeKeystoreError(
-            f"everybody can rename what is in {printable(root.parent)}: "
+            f"everybody can rename what is in {quoted(root.parent)}: "
             f"chmod o-w {shlex.quote(str(root.parent))}, or put the keystore elsewhere"
         )
 

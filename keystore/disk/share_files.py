@@ -10,8 +10,9 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
-from keystore.errors import StorageError, UnsafeKeystoreError, printable
+from keystore.errors import StorageError, UnsafeKeystoreError
 from keystore.formats.enclave_name import from_flat_name
 from keystore.formats.shares import Share, parse_shares
 
@@ -24,7 +25,7 @@ def read_shares(root: Path, enclave: str) -> tuple[Share, ...]:
         return ()
     if problem := safe_files.private_problem(f"{root}/{relative}", os.stat(f"{root}/{relative}")):
         raise UnsafeKeystoreError(problem)  # what it asks for would be signed
-    return parse_shares(text, printable(root / relative))
+    return parse_shares(text, quoted(root / relative))
 
 
 def enclaves_with_shares(root: Path) -> Iterator[str]:

@@ -11,10 +11,11 @@ import os
 import shlex
 from collections.abc import Callable, Iterator
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.register_file import read_register
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, InvalidInputError, OtherFormError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, OtherFormError
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, parse_governance, read_foreign_governance
@@ -25,13 +26,13 @@ from keystore.signing import smime
 
 def signed_governance(view: KeystoreView) -> smime.SignedDocument:
     """Reads what is in force (``governance.p7s``); its signature is not checked. Raises DamagedKeystoreError."""
-    place = printable(view.root / layout.GOVERNANCE)
+    place = quoted(view.root / layout.GOVERNANCE)
     return smime.read(safe_files.read(view.root, layout.GOVERNANCE), place)
 
 
 def governance_in_force(view: KeystoreView) -> Governance:
     """Return what ``governance.p7s`` says; its signature is not checked. Raises DamagedKeystoreError."""
-    return parse_governance(signed_governance(view).document, printable(view.root / layout.GOVERNANCE))
+    return parse_governance(signed_governance(view).document, quoted(view.root / layout.GOVERNANCE))
 
 
 def governance_domains(view: KeystoreView) -> Domains:
@@ -39,7 +40,7 @@ def governance_domains(view: KeystoreView) -> Domains:
 
     Raises DamagedKeystoreError if that cannot be decided.
     """
-    place = printable(view.root / layout.GOVERNANCE)
+    place = quoted(view.root / layout.GOVERNANCE)
     register = read_register(view.root)
     if register is not None and register.governance:
         return parse_governance(register.governance, place).domains()
@@ -54,7 +55,7 @@ def foreign_governance(view: KeystoreView) -> tuple[Governance, tuple[str, ...]]
 
     Raises DamagedKeystoreError for one that none of our CAs signed, or that DDS implementations read differently.
     """
-    place = printable(view.root / layout.GOVERNANCE)
+    place = quoted(view.root / layout.GOVERNANCE)
     try:
         return read_foreign_governance(foreign_document(view, layout.GOVERNANCE), place)
     except (InvalidInputError, DamagedKeystoreError) as error:
@@ -97,7 +98,7 @@ def foreign_document(view: KeystoreView, relative: str) -> bytes:
 
 
 def _trusted(view: KeystoreView, relative: str, read: Callable[[bytes, str], smime.SignedDocument]) -> bytes:
-    place = printable(view.root / relative)
+    place = quoted(view.root / relative)
     signed = read(safe_files.read(view.root, relative), place)
     smime.check(signed, list(own_permissions_cas(view)), place)
     return signed.document
@@ -112,4 +113,4 @@ def own_permissions_cas(view: KeystoreView) -> Iterator[CertificateFacts]:
     for name in names:
         pem = safe_files.read_if_there(view.root, name)
         if pem is not None and name.endswith(".cert.pem"):
-            yield from read_certificates(pem, printable(view.root / name))
+            yield from read_certificates(pem, quoted(view.root / name))

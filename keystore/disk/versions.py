@@ -17,10 +17,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, lock, safe_files
 from keystore.disk.archive import parents
 from keystore.disk.store import Content, Link, create_root, sync_path, write_new
-from keystore.errors import NotAKeystoreError, printable, storage_errors
+from keystore.errors import NotAKeystoreError, storage_errors
 
 PENDING = "pending"
 _STAGING = ".staging"
@@ -36,7 +37,7 @@ class Versions:
         self.folder = self.root.with_name(f"{self.root.name}.d")
         if os.path.lexists(self.root) and not self._is_ours():
             raise NotAKeystoreError(
-                f"{printable(self.root)} exists and was not imported; choose another place, or move it away "
+                f"{quoted(self.root)} exists and was not imported; choose another place, or move it away "
                 "and import with --require-ca"
             )
 

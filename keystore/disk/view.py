@@ -15,6 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.errors import (
     DamagedKeystoreError,
@@ -23,7 +24,6 @@ from keystore.errors import (
     NotAKeystoreError,
     SigningUnavailableError,
     StorageError,
-    printable,
     storage_errors,
 )
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_certificates
@@ -79,14 +79,14 @@ class KeystoreView:
         """Raise NotAKeystoreError for a directory with other things in it, in which no keystore can be made."""
         if not self.is_complete and not self.can_be_completed:
             raise NotAKeystoreError(
-                f"{printable(self.root)} is not a keystore, and other files are in it\n"
+                f"{quoted(self.root)} is not a keystore, and other files are in it\n"
                 f"try: secure-keystore create {shlex.quote(str(self.root / 'keystore'))}"
             )
 
     def require_complete(self) -> None:
         if not self.root.is_dir():
             raise NotAKeystoreError(
-                f"there is no keystore at {printable(self.root)}\n"
+                f"there is no keystore at {quoted(self.root)}\n"
                 f"try: secure-keystore create {shlex.quote(str(self.root))}"
             )
         if self.is_complete:
@@ -94,12 +94,12 @@ class KeystoreView:
         around = next((each for each in self.root.parents if KeystoreView(each).is_complete), None)
         if around is not None:
             raise NotAKeystoreError(
-                f"{printable(self.root)} is a folder inside the keystore {printable(around)}\n"
+                f"{quoted(self.root)} is a folder inside the keystore {quoted(around)}\n"
                 f"try: secure-keystore verify {shlex.quote(str(around))}"
             )
         if self.can_be_completed:
             raise NotAKeystoreError(
-                f"{printable(self.root)} is not a complete keystore: it is empty, or its creation was interrupted\n"
+                f"{quoted(self.root)} is not a complete keystore: it is empty, or its creation was interrupted\n"
                 f"try: secure-keystore create {shlex.quote(str(self.root))}"
             )
         self.refuse_foreign()
@@ -123,7 +123,7 @@ class KeystoreView:
         bundles = {}
         for role in Role:
             name = layout.ca_cert(role)
-            present = read_certificates(safe_files.read(self.root, name), printable(self.root / name))
+            present = read_certificates(safe_files.read(self.root, name), quoted(self.root / name))
             coming = [self._successors[role].facts] if role in self._successors else []
             bundles[role] = [*coming, *present]
         return bundles
@@ -157,12 +157,12 @@ class KeystoreView:
         name = self.key_file(role)
         if name is None:
             raise SigningUnavailableError(
-                f"{printable(self.root / layout.ca_key(role))} is not here, so nothing can be signed; "
+                f"{quoted(self.root / layout.ca_key(role))} is not here, so nothing can be signed; "
                 "run this where the CA keys are, then deploy"
             )
         reference = safe_files.read_private(self.root, name)
-        key = open_key(reference, printable(self.root / name), access)
-        return authority_of(self.ca(role), key, printable(self.root / layout.ca_cert(role)))
+        key = open_key(reference, quoted(self.root / name), access)
+        return authority_of(self.ca(role), key, quoted(self.root / layout.ca_cert(role)))
 
     @cached_property
     def has_crl(self) -> bool:
@@ -186,7 +186,7 @@ class KeystoreView:
         pem = self.enclave_file(enclave, layout.CERT)
         if pem is None:
             return None
-        return read_certificate(pem, printable(layout.enclave_file(enclave, layout.CERT)))
+        return read_certificate(pem, quoted(layout.enclave_file(enclave, layout.CERT)))
 
     def readable_certificate(self, enclave: str) -> CertificateFacts | None:
         """Return the certificate that an enclave has; None also for one that cannot be read."""
@@ -197,7 +197,7 @@ class KeystoreView:
     def common_name(self, enclave: str) -> str | None:
         """Return the common name of the certificate that an enclave has; None without one, or for an empty file."""
         pem = self.enclave_file(enclave, layout.CERT)
-        place = printable(layout.enclave_file(enclave, layout.CERT))
+        place = quoted(layout.enclave_file(enclave, layout.CERT))
         return read_certificate(pem, place).common_name if pem else None
 
     def require_enclaves(self, names: Iterable[str]) -> None:
@@ -205,7 +205,7 @@ class KeystoreView:
         unknown = sorted(set(names) - set(self.enclaves()))
         if unknown:
             raise InvalidInputError(
-                f"no enclave {', '.join(unknown)} in {printable(self.root)}\n"
+                f"no enclave {', '.join(unknown)} in {quoted(self.root)}\n"
                 f"try: secure-keystore list {shlex.quote(str(self.root))}"
             )
 
@@ -216,7 +216,7 @@ class KeystoreView:
             found = [name for name in names if fnmatchcase(name, pattern)]
             if not found:
                 raise InvalidInputError(
-                    f"no enclave matches {printable(pattern)}\n"
+                    f"no enclave matches {quoted(pattern)}\n"
                     f"try: secure-keystore list {shlex.quote(str(self.root))}"
                 )
             fitting.update(found)

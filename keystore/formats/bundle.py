@@ -16,7 +16,8 @@ from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import lines_json
 from keystore.formats.role import Role
@@ -31,7 +32,7 @@ def refuse_host_name(name: str, where: str) -> None:
     """Raise InvalidInputError if ``name`` cannot name a file, a Compose service and a Kubernetes node."""
     if not _HOST.match(name):
         raise InvalidInputError(
-            f"{where}: {printable(name)} is not a host name: 1 to 63 of letters, digits, '.', '_' and '-', "
+            f"{where}: {quoted(name)} is not a host name: 1 to 63 of letters, digits, '.', '_' and '-', "
             "a letter or digit first and last"
         )
 
@@ -142,13 +143,13 @@ def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
         role, _, digest = one.partition("=")
         if role not in _ROLES or not digest:
             raise InvalidInputError(
-                f"--require-ca {printable(one)}: say what that CA may do, identity=SHA256 or permissions=SHA256, as "
+                f"--require-ca {quoted(one)}: say what that CA may do, identity=SHA256 or permissions=SHA256, as "
                 "secure-keystore export prints it"
             )
         plain = digest.replace(":", "").lower()
         if re.fullmatch("[0-9a-f]{64}", plain) is None:
             raise InvalidInputError(
-                f"--require-ca {printable(one)}: {len(plain)} characters, and a SHA-256 fingerprint has 64 hex digits\n"
+                f"--require-ca {quoted(one)}: {len(plain)} characters, and a SHA-256 fingerprint has 64 hex digits\n"
                 "try: secure-keystore export again where the CA is; its last line has the options to copy"
             )
         found[_ROLES[role]].add(plain)

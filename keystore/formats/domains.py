@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 
 LOWEST_ID = 0
 HIGHEST_ID = 230
@@ -55,7 +56,7 @@ class Domains(_Ranges):
         for part in text.split(","):
             match = re.fullmatch(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", part.strip())
             if match is None:
-                raise InvalidInputError(f"{printable(text)} are not domain ids; write 0, 0-10 or 0,5,7-9")
+                raise InvalidInputError(f"{quoted(text)} are not domain ids; write 0, 0-10 or 0,5,7-9")
             ranges.append((int(match[1]), int(match[2] or match[1])))
         return cls(tuple(ranges))
 
@@ -86,7 +87,7 @@ def read_domains(element: Element, lost: list[str]) -> Domains:
             len(part) and part[0].tag == "max"
         ):
             raise InvalidInputError(
-                f"domain id {printable(' '.join(texts))}: DDS implementations read it in different ways"
+                f"domain id {quoted(' '.join(texts))}: DDS implementations read it in different ways"
             )
         first, last = int(texts[0]), int(texts[-1])
         if first > HIGHEST_ID:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError
 
 # RMW_TOPIC_MAX_NAME_LENGTH (247) minus two, where SROS2's namespace check stops; rcl itself allows 255.
 MAX_LENGTH = 245
@@ -56,9 +57,9 @@ def _differences(name: str) -> str:
         if segment in (".", ".."):
             return f"{segment!r} is not allowed, names are not paths"
         if segment[0].isdigit():
-            return f"segment {printable(segment)} starts with a digit"
+            return f"segment {quoted(segment)} starts with a digit"
         if not _SEGMENT.match(segment):
-            return f"segment {printable(segment)} has characters other than ASCII letters, digits and '_'"
+            return f"segment {quoted(segment)} has characters other than ASCII letters, digits and '_'"
     raise AssertionError("a name refused by the whole rule must break one of its parts")
 
 
@@ -74,7 +75,7 @@ def check_distinct(names: Iterable[str]) -> None:
         for prefix in _prefixes(name):
             other = seen.setdefault(prefix.lower(), prefix)
             if other != prefix:
-                raise InvalidEnclaveNameError(name, f"it differs from {printable(other)} only in case")
+                raise InvalidEnclaveNameError(name, f"it differs from {quoted(other)} only in case")
 
 
 def _prefixes(name: str) -> Iterable[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from enclave_common.files import read_bytes
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 
 MAX_BYTES = 200_000
 
@@ -15,4 +16,4 @@ def read_given(path: Path) -> bytes:
     try:
         return read_bytes(path, MAX_BYTES)
     except OSError as error:
-        raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
+        raise InvalidInputError(f"cannot read {quoted(path)}: {error.strerror}") from None

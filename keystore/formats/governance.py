@@ -14,7 +14,8 @@ from enum import Enum
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains, read_domains
 from keystore.formats.permissions_names import is_dds_expression
 from keystore.formats.safe_xml import not_as_written, parse_foreign, parse_own
@@ -49,7 +50,7 @@ class TopicRule:
     def __post_init__(self) -> None:
         if not is_dds_expression(self.topic_expression):
             raise InvalidInputError(
-                f"governance: topic_expression {printable(self.topic_expression)} is not one that Cyclone DDS and "
+                f"governance: topic_expression {quoted(self.topic_expression)} is not one that Cyclone DDS and "
                 "Fast DDS read alike: letters, digits, '_', '/', and the wildcards * ? [abc] [a-z] [!abc]"
             )
         if self.data_protection_kind not in _DATA_KINDS:

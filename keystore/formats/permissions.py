@@ -21,7 +21,7 @@ from datetime import datetime
 from functools import lru_cache
 from typing import NamedTuple
 
-from keystore.errors import printable
+from enclave_common.terminal import quoted
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_names import DISCOVERY_TOPIC, Topics, add_dds_topics, full_name
 from keystore.formats.permissions_patterns import Expressions, any_matches, covers, has_wildcard
@@ -116,7 +116,7 @@ def dds_rules(policy: EnclavePolicy) -> DdsRules:
                 publish, subscribe = allowed if qualifier is allow else denied
                 add_dds_topics(operation, full_name(expression, profile), publish, subscribe)
     except PolicyError as error:
-        raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
+        raise PolicyError(f"enclave {quoted(policy.path)}: {error}") from None
     # Without it an rmw cannot even create its context; Zenoh, which has none, gets no rule from it.
     if policy.publishes_discovery:
         allowed[0].add(DISCOVERY_TOPIC)
@@ -207,5 +207,5 @@ def _utc(time: datetime) -> str:
 
 def _plain(text: str) -> str:
     if not _PLAIN.match(text):
-        raise PolicyError(f"{printable(text)} cannot be the subject or name of a grant")
+        raise PolicyError(f"{quoted(text)} cannot be the subject or name of a grant")
     return text

@@ -12,7 +12,8 @@ from datetime import timedelta
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains, read_domains
 from keystore.formats.permissions import HEAD, DdsRules, Permissions, TopicSets
 from keystore.formats.permissions_names import is_dds_expression, ros_rules
@@ -51,9 +52,7 @@ def read_foreign_permissions(document: bytes, enclave: str, where: str) -> Taken
     mine = next((grant for grant in grants if _is_for(grant, enclave)), None)
     if mine is None:
         raise InvalidInputError(f"{where}: no grant for {enclave}")
-    lost = [
-        f"the grant for {printable(_text(grant, 'subject_name'))}" for grant in grants if grant is not mine
-    ]
+    lost = [f"the grant for {quoted(_text(grant, 'subject_name'))}" for grant in grants if grant is not mine]
     if _text(mine, "default") != "DENY":
         lost.append("default ALLOW: everything that no rule names")
     found = _read(mine, lost, margin=timedelta(0))
@@ -130,7 +129,7 @@ def _topics(rule: Element, direction: str, allowed: bool, lost: list[str]) -> It
             lost.append(f"{direction} of partitions or data tags, which ROS does not use")
             continue
         for expression in (topic.text or "" for topic in criteria.iterfind("topics/topic")):
-            what = f"{direction} {printable(expression)}: DDS implementations read it in different ways"
+            what = f"{direction} {quoted(expression)}: DDS implementations read it in different ways"
             if is_dds_expression(expression):
                 yield expression
             elif allowed:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from keystore.errors import printable
+from enclave_common.terminal import quoted
 from keystore.formats.policy import Operation, PolicyError, Profile, Qualifier, Rule
 
 DISCOVERY_TOPIC = "ros_discovery_info"
@@ -62,7 +62,7 @@ def full_name(expression: str, profile: Profile) -> str:
         return expression
     _check_profile(profile)
     if problem := _problem(expression):
-        raise PolicyError(f"{printable(expression)} {problem}")
+        raise PolicyError(f"{quoted(expression)} {problem}")
     ns = "" if profile.ns == "/" else profile.ns
     if expression[0] == "~":
         name = f"{ns}/{profile.node}{expression[1:]}"
@@ -128,11 +128,11 @@ def _candidates(operation: Operation, topics: tuple[set[str], set[str]]) -> set[
 def _check_profile(profile: Profile) -> None:
     if not re.match(_NAMESPACE, profile.ns):
         raise PolicyError(
-            f"ns={printable(profile.ns)} is not an absolute namespace; write for example '/' or '/robot'"
+            f"ns={quoted(profile.ns)} is not an absolute namespace; write for example '/' or '/robot'"
         )
     if not _NODE_PATTERN.match(profile.node) or len(profile.node) > 255:
         raise PolicyError(
-            f"node={printable(profile.node)} is not a node name, nor a pattern of names (* ? [abc] [a-z] [!abc])"
+            f"node={quoted(profile.node)} is not a node name, nor a pattern of names (* ? [abc] [a-z] [!abc])"
         )
 
 

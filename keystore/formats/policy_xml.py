@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_common.files import read_bytes
-from keystore.errors import InvalidEnclaveNameError, InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidEnclaveNameError, InvalidInputError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import has_wildcard
@@ -72,7 +73,7 @@ def read_policy(path: str | Path) -> PolicyDocument:
     try:
         document = read_bytes(file)
     except OSError as error:
-        raise PolicyError(f"cannot read policy {printable(file)}: {error.strerror}") from None
+        raise PolicyError(f"cannot read policy {quoted(file)}: {error.strerror}") from None
     return replace(parse_policy(document, str(file), folder=file.parent), file=str(file))
 
 
@@ -85,11 +86,11 @@ def read_policies(path: str | Path) -> PolicyDocument:
     try:
         found = [(file, read_bytes(file)) for file in sorted(folder.glob("*.xml"))]
     except OSError as error:
-        raise PolicyError(f"cannot read policy {printable(error.filename)}: {error.strerror}") from None
+        raise PolicyError(f"cannot read policy {quoted(error.filename)}: {error.strerror}") from None
     roots = [PolicyElement(parse_xml(document, str(file)), str(file)) for file, document in found]
     read = [reader.read(root) for root in roots if root.element.tag == "policy"]
     if not read:
-        raise PolicyError(f"{printable(path)} holds no policy: no *.xml in it begins with <policy>")
+        raise PolicyError(f"{quoted(path)} holds no policy: no *.xml in it begins with <policy>")
     return replace(read[-1], file=str(path))
 
 
@@ -114,7 +115,7 @@ class _PolicyReader:
             return self._read_nodes(root)
         if version != VERSION:
             raise PolicyError(
-                f"{root.where}: policy version {printable(version)} is not supported, only {VERSION}"
+                f"{root.where}: policy version {quoted(version)} is not supported, only {VERSION}"
             )
         enclaves, *rest = list(self._reader.children(root)) or [root]
         if rest:
@@ -210,9 +211,7 @@ class _PolicyReader:
             if value is None:
                 continue
             if value not in ("ALLOW", "DENY"):
-                raise PolicyError(
-                    f"{group.where}: {operation.value}={printable(value)} must be ALLOW or DENY"
-                )
+                raise PolicyError(f"{group.where}: {operation.value}={quoted(value)} must be ALLOW or DENY")
             found[operation] = Qualifier(value)
         if not found:
             names = " or ".join(operation.value for operation in operations)
@@ -381,7 +380,7 @@ class IncludingReader:
             raise PolicyError(f"{where}: more than {MAX_INCLUDES} includes")
         chain = (*include.chain, f"{include.file}:{include.element.sourceline}")
         if len(chain) > MAX_DEPTH or str(path) in (include.file, *(c.rpartition(":")[0] for c in chain)):
-            raise PolicyError(f"{where}: the include of {printable(path)} goes round in a circle or too deep")
+            raise PolicyError(f"{where}: the include of {quoted(path)} goes round in a circle or too deep")
         found = _pointed(self._root(path, where), include.element, where)
         yield from self._found(found, str(path), chain)
 
@@ -394,11 +393,11 @@ class IncludingReader:
         if self._folder is None:
             raise PolicyError(f"{where}: includes are only followed in a policy file, not here")
         if not href or ":" in href or "\\" in href or not href.isprintable() or href.startswith("/"):
-            raise PolicyError(f"{where}: {printable(href)} is not a relative path of a file")
+            raise PolicyError(f"{where}: {quoted(href)} is not a relative path of a file")
         path = (Path(include.file).parent / href).resolve()
         if not path.is_relative_to(self._folder):
             raise PolicyError(
-                f"{where}: {printable(href)} is outside the policy's folder {printable(self._folder)}; "
+                f"{where}: {quoted(href)} is outside the policy's folder {quoted(self._folder)}; "
                 "copy the file there"
             )
         return path
@@ -408,7 +407,7 @@ class IncludingReader:
             try:
                 document = read_bytes(path, MAX_TOTAL_BYTES)
             except OSError as error:
-                raise PolicyError(f"{where}: cannot include {printable(path)}: {error.strerror}") from None
+                raise PolicyError(f"{where}: cannot include {quoted(path)}: {error.strerror}") from None
             self._bytes += len(document)
             if len(self._roots) >= MAX_FILES or self._bytes > MAX_TOTAL_BYTES:
                 raise PolicyError(f"{where}: more than {MAX_FILES} files or {MAX_TOTAL_BYTES} bytes included")
@@ -424,7 +423,7 @@ def _pointed(root: etree._Element, include: etree._Element, where: str) -> list[
     match = _XPOINTER.match(pointer)
     if match is None:
         raise PolicyError(
-            f"{where}: xpointer {printable(pointer)} is not supported; write a plain path such as xpointer(/profile/*)"
+            f"{where}: xpointer {quoted(pointer)} is not supported; write a plain path such as xpointer(/profile/*)"
         )
     first, *steps = match[1][1:].split("/")
     found = [root] if root.tag == first else []
@@ -436,5 +435,5 @@ def _pointed(root: etree._Element, include: etree._Element, where: str) -> list[
             if step in ("*", child.tag) or child.tag in _INCLUDE_TAGS
         ]
     if not found:
-        raise PolicyError(f"{where}: xpointer {printable(pointer)} selects nothing")
+        raise PolicyError(f"{where}: xpointer {quoted(pointer)} selects nothing")
     return found

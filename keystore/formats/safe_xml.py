@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from keystore.errors import InvalidInputError, OtherFormError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError, OtherFormError
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -34,7 +35,7 @@ def parse_xml(document: bytes, where: str) -> etree._Element:
     label = _LABEL.match(document)
     if label is not None and label[1].lower() not in (b"utf-8", b"us-ascii"):
         raise InvalidInputError(
-            f"{where}: says that it is in {printable(label[1].decode('latin-1'))}; write it in UTF-8"
+            f"{where}: says that it is in {quoted(label[1].decode('latin-1'))}; write it in UTF-8"
         )
     # The parser takes the bytes as UTF-8 whatever they say, as DDS implementations do.
     parser = etree.XMLParser(
@@ -91,7 +92,7 @@ def parse_foreign(document: bytes, schema: str, where: str, what: str) -> Elemen
     if found := _READ_APART.search(document):
         line = document.count(b"\n", 0, found.start()) + 1
         raise InvalidInputError(
-            f"{where}:{line}: {printable(found[0].decode('latin-1'))}: DDS implementations read this in different ways"
+            f"{where}:{line}: {quoted(found[0].decode('latin-1'))}: DDS implementations read this in different ways"
         )
     root = parse_xml(document, where)
     try:

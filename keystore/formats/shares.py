@@ -11,7 +11,8 @@ from functools import lru_cache
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import TopicSets, dds_rules
 from keystore.formats.permissions_patterns import Expressions
@@ -70,9 +71,9 @@ def _refuse_losses(enclave: str, shares: tuple[Share, ...], together: EnclavePol
             lost = [topic for topic in own if not present.cover(topic)]
             lost += [topic for one in refused if one not in denied for topic in had.meeting(one)]
             if lost:
-                others = ", ".join(printable(other.owner) for other in shares if other is not share)
+                others = ", ".join(quoted(other.owner) for other in shares if other is not share)
                 raise InvalidInputError(
-                    f"enclave {enclave} is shared by {printable(share.owner)} and {others}, and what one of them "
+                    f"enclave {enclave} is shared by {quoted(share.owner)} and {others}, and what one of them "
                     f"denies the other needs ({lost[0]}): give them enclaves of their own"
                 )
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 from keystore.formats.compact import PARAMETER_SERVICES
 from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import has_wildcard
@@ -178,7 +179,7 @@ def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
     for target in targets:
         if has_wildcard(target) or "~" in target:
             raise InvalidInputError(
-                f"{printable(target)}: a tool is given its targets one by one, without wildcards"
+                f"{quoted(target)}: a tool is given its targets one by one, without wildcards"
             )
         full_name(target, Profile("/", "tool", ()))
     return targets

@@ -11,7 +11,8 @@ import re
 from datetime import datetime, timedelta, timezone
 from typing import NamedTuple
 
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 
 BACKDATE = timedelta(days=1)
 """As SROS2, for clocks behind ours and Connext 5.3.1; Fast DDS needs at least 14 h."""
@@ -87,7 +88,7 @@ def parse_duration(text: str) -> timedelta:
     """Parse ``90d``, ``12h``, ``10y`` (a year is 365 days), ``45m``, ``30s``, ``2w``; raises InvalidInputError."""
     match = _DURATION.match(text.strip())
     if not match:
-        raise InvalidInputError(f"{printable(text)} is not a duration; write for example 90d, 12h or 10y")
+        raise InvalidInputError(f"{quoted(text)} is not a duration; write for example 90d, 12h or 10y")
     count, unit = int(match[1]), match[2]
     return timedelta(days=365 * count) if unit == "y" else timedelta(**{_UNITS[unit]: count})
 
@@ -97,13 +98,11 @@ def parse_time(text: str) -> datetime:
     try:
         time = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:
-        raise InvalidInputError(
-            f"{printable(text)} is not an ISO date; write for example 2030-12-31"
-        ) from None
+        raise InvalidInputError(f"{quoted(text)} is not an ISO date; write for example 2030-12-31") from None
     try:
         return time.astimezone(timezone.utc) if time.tzinfo else time.replace(tzinfo=timezone.utc)
     except OverflowError:
-        raise InvalidInputError(f"{printable(text)} is a date before the year 1 or after 9999") from None
+        raise InvalidInputError(f"{quoted(text)} is a date before the year 1 or after 9999") from None
 
 
 def parse_end(text: str, now: datetime) -> datetime:

@@ -18,7 +18,8 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from keystore.errors import InvalidInputError, SigningUnavailableError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats.certificate import CertificateFacts, read_der
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
@@ -179,7 +180,7 @@ def check_can_serve(facts: CertificateFacts, role: Role, now: datetime, place: s
         raise InvalidInputError(f"{place} may not sign documents (key usage lacks digitalSignature)")
     if facts.issuer != facts.subject:
         raise InvalidInputError(
-            f"{place} is an intermediate CA, issued by {printable(facts.certificate.issuer.rfc4514_string())}: Cyclone "
+            f"{place} is an intermediate CA, issued by {quoted(facts.certificate.issuer.rfc4514_string())}: Cyclone "
             "DDS refuses what it signs, even with the root in the same file. Give a self-signed CA, such as the root, "
             "or let secure-keystore create one"
         )

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.errors import InvalidInputError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError
 
 _PR_SET_DUMPABLE = 4
 _MAX_SECRET = 1023  # what OpenSSL takes for an encrypted key
@@ -62,7 +63,7 @@ class Secret:
 
     def _place(self) -> str:
         if self.file is not None:
-            return printable(self.file)
+            return quoted(self.file)
         return f"descriptor {self.descriptor}" if self.descriptor is not None else f"${self.variable}"
 
 

@@ -13,7 +13,8 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 from cryptography.hazmat.primitives.serialization import load_der_public_key
 
-from keystore.errors import InvalidInputError, SigningUnavailableError, printable
+from enclave_common.terminal import quoted
+from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats.certificate import CertificateFacts
 from keystore.signing.private_key import key_pem, load_private_key, spki
 
@@ -33,7 +34,7 @@ def _fingerprint(text: str) -> str:
     plain = text.rpartition("=")[2].replace(":", "").lower()
     if re.fullmatch("[0-9a-f]{64}", plain) is None:
         raise InvalidInputError(
-            f"{printable(text)} is not the SHA-256 fingerprint of a CA: 64 hex digits, with or without colons\n"
+            f"{quoted(text)} is not the SHA-256 fingerprint of a CA: 64 hex digits, with or without colons\n"
             "try: openssl x509 -noout -fingerprint -sha256 -in KEYSTORE/public/permissions_ca.cert.pem"
         )
     return plain

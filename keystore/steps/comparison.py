@@ -13,6 +13,7 @@ from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout
 from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.deployed import deployment_problem, refuse_changed_deployment
@@ -20,7 +21,7 @@ from keystore.disk.register_file import needs_register, read_register, refuse_fo
 from keystore.disk.safe_files import refuse_foreign_owner, resolve_root
 from keystore.disk.signed_documents import governance_domains, governance_stands
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, SigningUnavailableError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, SigningUnavailableError
 from keystore.formats.compact import (
     PATTERN,
     compact_nodes,
@@ -333,12 +334,12 @@ def refuse_without_keys(
     if view.key_file(Role.PERMISSIONS) is not None:
         place = shlex.quote(str(view.root))
         raise SigningUnavailableError(
-            f"the identity CA of {printable(view.root)} is not here, so no certificate can be issued, but these "
+            f"the identity CA of {quoted(view.root)} is not here, so no certificate can be issued, but these "
             f"enclaves need one:{listed}\nRequest them on their hosts: secure-keystore request HOST_KEYSTORE ENCLAVE "
             f"-o requests.pem; take what the CA issued: secure-keystore sign {place} requests.pem --issued issued.pem"
         )
     raise SigningUnavailableError(
-        f"{printable(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
+        f"{quoted(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
         f"is needed:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "
         "then export again"
     )

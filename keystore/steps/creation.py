@@ -10,11 +10,12 @@ from datetime import timedelta
 from pathlib import Path
 
 from enclave_common.dependencies import require
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreSettings, KeystoreView
-from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import CertificateFacts, given_certificates, read_der
 from keystore.formats.clock import refuse_clock_before_program
 from keystore.formats.domains import Domains
@@ -88,7 +89,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
     refuse_unusable(chosen)
     now = chosen.now or utc_now()
     if chosen.now is None and not chosen.accept_clock:
-        refuse_clock_before_program(now, printable(root))
+        refuse_clock_before_program(now, quoted(root))
     store.create_root(root)
     with opened_for_change(root, now, chosen) as opened:
         return complete(opened, chosen)
@@ -229,7 +230,7 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
     """Refuse stand-alone enclaves of a bundle, or of a lost CA: another CA would replace what they trust."""
     if view.key_file(role) is None and os.path.isdir(view.root / layout.ENCLAVES) and view.enclaves():
         raise DamagedKeystoreError(
-            f"{printable(view.root)} holds enclaves, but not the {role.label} they belong to: "
+            f"{quoted(view.root)} holds enclaves, but not the {role.label} they belong to: "
             "a deployed copy, or a keystore to restore from a backup"
         )
 
@@ -246,7 +247,7 @@ def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> t
     if present is None:
         return None
     reference = safe_files.read_private(view.root, present)
-    key = open_key(reference, printable(view.root / present), options.access)
+    key = open_key(reference, quoted(view.root / present), options.access)
     return _self_signed(role, options, key), reference
 
 
@@ -266,20 +267,20 @@ def _passphrase(options: CreateOptions) -> Secret | None:
 
 def _import_ca(role: Role, options: CreateOptions, file: Path) -> tuple[Authority, bytes]:
     place, reference = options.imported[role].certificate, read_given(file)
-    key = open_key(reference, printable(file), options.access)
-    bound = authority.authority_of(_given(place), key, printable(place))
+    key = open_key(reference, quoted(file), options.access)
+    bound = authority.authority_of(_given(place), key, quoted(place))
     now = options.now or utc_now()
-    check_can_serve(bound.facts, role, now, printable(place))
+    check_can_serve(bound.facts, role, now, quoted(place))
     probe = None
     if role is Role.IDENTITY:  # its constraints on names show only below it
         name = common_name("/probe")
         probe = bound.issue(name, new_key().public_key(), Validity.starting(now, options.lifetime))
-    refuse_unfit_ca(bound.facts, role, printable(place), probe)
+    refuse_unfit_ca(bound.facts, role, quoted(place), probe)
     return bound, reference
 
 
 def _given(place: Path) -> CertificateFacts:
-    return given_certificates(read_given(place), printable(place))[0]
+    return given_certificates(read_given(place), quoted(place))[0]
 
 
 def _shared_ca_warnings(role: Role, options: CreateOptions) -> list[str]:
@@ -297,8 +298,8 @@ def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
     if role is not Role.IDENTITY:
         raise InvalidInputError("only the identity CA can be external: permissions are signed here")
     facts = _given(place)
-    check_can_serve(facts, role, options.now or utc_now(), printable(place))
-    refuse_unfit_ca(facts, role, printable(place))
+    check_can_serve(facts, role, options.now or utc_now(), quoted(place))
+    refuse_unfit_ca(facts, role, quoted(place))
     return facts
 
 
@@ -323,12 +324,12 @@ def _unsigned_default(root: Path) -> bytes | None:
         return None
     place = root / layout.GOVERNANCE_XML
     try:
-        found = parse_governance(present, printable(place))
+        found = parse_governance(present, quoted(place))
     except DamagedKeystoreError:
         found = None
     if found is not None and found == Governance.for_domains(found.domains()):
         return present
     raise DamagedKeystoreError(
-        f"{printable(place)} is not the default governance, and its signature governance.p7s is missing; look at "
+        f"{quoted(place)} is not the default governance, and its signature governance.p7s is missing; look at "
         f"it and remove it: rm {shlex.quote(str(place))}"
     )

@@ -14,6 +14,7 @@ from datetime import datetime, timedelta
 from enum import Enum
 from typing import NamedTuple
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import (
@@ -22,7 +23,6 @@ from keystore.errors import (
     OtherFormError,
     SigningUnavailableError,
     UnsafeKeystoreError,
-    printable,
 )
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_document import parse_permissions, taken_away
@@ -155,7 +155,7 @@ def _is_there(view: KeystoreView, directory: str) -> bool:
         try:
             if stat.S_ISLNK(os.lstat(path).st_mode):
                 raise UnsafeKeystoreError(
-                    f"{printable(path)} is a link; an enclave must be a real directory. "
+                    f"{quoted(path)} is a link; an enclave must be a real directory. "
                     f"Remove it: rm {shlex.quote(path)}"
                 )
         except FileNotFoundError:
@@ -210,7 +210,7 @@ def _key_mode(enclave: _Enclave) -> int:
     except (FileNotFoundError, NotADirectoryError):
         return 0
     if not stat.S_ISREG(info.st_mode):
-        raise UnsafeKeystoreError(f"{printable(path)} is not a regular file; remove it")
+        raise UnsafeKeystoreError(f"{quoted(path)} is not a regular file; remove it")
     if problem := safe_files.private_problem(path, info):
         raise UnsafeKeystoreError(problem)
     return stat.S_IMODE(info.st_mode)

@@ -6,11 +6,12 @@ from datetime import datetime, timedelta
 from functools import cached_property
 from itertools import count
 
+from enclave_common.terminal import quoted
 from enclave_common.words import some_of
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInputError, printable
+from keystore.errors import InvalidInputError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
@@ -213,7 +214,7 @@ class EnclaveWriter:
         relative = layout.request(state.enclave) if made_on_host else key_file
         actions.append("certificate")
         return public_half(
-            safe_files.read_private(self._view.root, relative), printable(self._view.root / relative)
+            safe_files.read_private(self._view.root, relative), quoted(self._view.root / relative)
         )
 
     def _token_key(self, state: EnclaveState) -> PublicKey:
@@ -226,7 +227,7 @@ class EnclaveWriter:
             raise InvalidInputError(
                 f"the key of enclave {state.enclave} is in a token ({layout.KEY_URI}), so a new one is made there: "
                 f"secure-keystore request KEYSTORE {state.enclave}, then sign it here; for a key in a file remove "
-                f"{printable(self._view.root / layout.enclave_file(state.enclave, layout.KEY_URI))}"
+                f"{quoted(self._view.root / layout.enclave_file(state.enclave, layout.KEY_URI))}"
             )
         return state.facts.certificate.public_key()  # type: ignore[return-value]
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.signed_documents import (
     governance_domains,
@@ -17,7 +18,7 @@ from keystore.disk.signed_documents import (
 )
 from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, KeystoreError, SigningUnavailableError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, SigningUnavailableError
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.register import Register
@@ -71,7 +72,7 @@ def _refuse_other_domains(view: KeystoreView, domains: Domains) -> None:
         governed = governance_domains(view)
     if not governed.covers(domains):
         raise SigningUnavailableError(
-            f"{printable(view.root)} is for domain {governed}, and domain {domains} is asked for (ROS_DOMAIN_ID or "
+            f"{quoted(view.root)} is for domain {governed}, and domain {domains} is asked for (ROS_DOMAIN_ID or "
             f"--domain-id); start in its domain (ROS_DOMAIN_ID={governed.ranges[0][0]}), or start once in domain "
             f"{domains} where the CA keys are, then export and import again"
         )
@@ -84,7 +85,7 @@ def governance_for(view: KeystoreView, register: Register, domains: Domains) -> 
     """
     try:
         document = register.governance or own_document(view, layout.GOVERNANCE)
-        governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
+        governance = parse_governance(document, quoted(view.root / layout.GOVERNANCE))
     except DamagedKeystoreError as error:
         raise DamagedKeystoreError(
             f"{error}; put yours in force: secure-keystore governance {shlex.quote(str(view.root))} FILE.yaml"

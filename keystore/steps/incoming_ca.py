@@ -6,9 +6,10 @@ certificate beside another CA's key. Writes the keystore.
 
 from __future__ import annotations
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Content, Store
-from keystore.errors import DamagedKeystoreError, printable
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import read_certificates
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
@@ -51,7 +52,7 @@ def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
     uri = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY_URI}")
     if pem is None and uri is None:
         raise DamagedKeystoreError(
-            f"{printable(opened.root / waiting)} holds a certificate without key; remove it"
+            f"{quoted(opened.root / waiting)} holds a certificate without key; remove it"
         )
     name, stale = layout.ca_key(role), layout.ca_key_uri(role)
     if pem is None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from enclave_common.words import counted
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.crl_file import ListedCrl, crls_in, load_crl
@@ -16,7 +17,7 @@ from keystore.disk.register_file import needs_register
 from keystore.disk.signed_documents import foreign_document, foreign_governance, own_document
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, WrongClockError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, WrongClockError
 from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates, read_der
 from keystore.formats.governance import governance_document, parse_governance
 from keystore.formats.permissions_document import parse_permissions, read_foreign_permissions
@@ -77,7 +78,7 @@ def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
     if not accepted:
         raise WrongClockError(
             f"the clock says {iso(now)}, and the register was written at {iso(last)}: set the clock, or, if it is "
-            f"right, accept it with secure-keystore renew {printable(opened.root)} --accept-clock"
+            f"right, accept it with secure-keystore renew {quoted(opened.root)} --accept-clock"
         )
     opened.clock = now
     with opened.batch() as batch:
@@ -183,7 +184,7 @@ def _certificates_in(view: KeystoreView, directory: str, prefix: str) -> Iterato
     for name in names:
         if name.startswith(prefix) and name.endswith(layout.CERT):
             pem = safe_files.read(view.root, f"{directory}/{name}")
-            yield from read_certificates(pem, printable(view.root / directory / name))
+            yield from read_certificates(pem, quoted(view.root / directory / name))
 
 
 def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:
@@ -230,9 +231,9 @@ def taken_over(view: KeystoreView, enclave: str) -> tuple[bytes, tuple[str, ...]
     place = layout.enclave_file(enclave, layout.PERMISSIONS)
     try:
         document = own_document(view, place)
-        parse_permissions(document, printable(view.root / place))
+        parse_permissions(document, quoted(view.root / place))
     except OtherFormError:
-        foreign, where = foreign_document(view, place), printable(view.root / place)
+        foreign, where = foreign_document(view, place), quoted(view.root / place)
         found = read_foreign_permissions(foreign, enclave, where)
         return found.permissions.document(), found.lost
     return document, ()

@@ -6,10 +6,11 @@ too; to sign it again, or to compare with it, would give back what was taken awa
 
 from __future__ import annotations
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout
 from keystore.disk.signed_documents import governance_domains, own_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError
 from keystore.formats.permissions import Permissions, permissions_document
 from keystore.formats.permissions_document import parse_permissions, taken_away
 from keystore.formats.policy import EnclavePolicy
@@ -62,7 +63,7 @@ def previous_permissions(
         permissions = _present(view, enclave, last)
         if last is not None and rules_digest(permissions) != last.rules:
             raise DamagedKeystoreError(
-                f"{printable(view.root / place)} is not what was signed last for {enclave}"
+                f"{quoted(view.root / place)} is not what was signed last for {enclave}"
             )
         return permissions._replace(subject=subject, validity=validity).document()
     except KeystoreError as error:
@@ -79,11 +80,11 @@ def _present(view: KeystoreView, enclave: str, last: SignedPermissions | None) -
     place = layout.enclave_file(enclave, layout.PERMISSIONS)
     twin = view.enclave_file(enclave, layout.PERMISSIONS_XML)
     if last is not None and twin is not None and fingerprint(twin) == last.document:
-        return parse_permissions(twin, printable(view.root / place))
+        return parse_permissions(twin, quoted(view.root / place))
     document = own_document(view, place) if last is None else taken_over(view, enclave)[0]
-    permissions = parse_permissions(document, printable(view.root / place))
+    permissions = parse_permissions(document, quoted(view.root / place))
     if not names_enclave(permissions.subject.removeprefix("CN="), enclave):
-        raise DamagedKeystoreError(f"{printable(view.root / place)} is for {printable(permissions.subject)}")
+        raise DamagedKeystoreError(f"{quoted(view.root / place)} is for {quoted(permissions.subject)}")
     return permissions
 
 

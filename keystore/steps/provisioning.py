@@ -15,6 +15,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from enclave_common.dependencies import require
+from enclave_common.terminal import quoted
 from enclave_common.words import counted, some_of
 from keystore.add_ons import follow
 from keystore.disk import layout, store
@@ -24,7 +25,7 @@ from keystore.disk.share_files import read_shares
 from keystore.disk.signed_documents import governance_domains, governance_in_force
 from keystore.disk.store import Batch, Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
+from keystore.errors import InvalidInputError, KeystoreError, StorageError
 from keystore.formats.clock import refuse_clock_before_program
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
@@ -115,9 +116,7 @@ def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
     names = [validate_enclave_name(policy.path) for policy in policies]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidInputError(
-            f"enclave {printable(twice)} is given twice; merge its profiles into one policy"
-        )
+        raise InvalidInputError(f"enclave {quoted(twice)} is given twice; merge its profiles into one policy")
     return policies
 
 
@@ -127,7 +126,7 @@ def bring_about(
     """Compare, and reconcile what differs. ``root`` is resolved, the names are valid and in order."""
     now = options.now or utc_now()
     if options.now is None and not options.accept_clock:
-        refuse_clock_before_program(now, printable(root))
+        refuse_clock_before_program(now, quoted(root))
     refuse_foreign_owner(root, wanted)
     if (report := compare(root, wanted, options, now)) is None:
         report = reconcile(root, wanted, options, now)

@@ -15,12 +15,13 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from enclave_common.words import some_of
 from keystore.add_ons import follow
 from keystore.disk import layout
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import SigningUnavailableError, printable
+from keystore.errors import SigningUnavailableError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
@@ -75,7 +76,7 @@ def remove(
     with opened_for_change(root, now, chosen) as opened:
         if not opened.has_register:
             raise SigningUnavailableError(
-                f"{printable(root)} is a deployed copy without CA keys: {some_of(wanted, 3)} cannot be removed "
+                f"{quoted(root)} is a deployed copy without CA keys: {some_of(wanted, 3)} cannot be removed "
                 "here; remove it where the CA keys are, then deploy"
             )
         view = KeystoreView(root)

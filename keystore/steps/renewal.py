@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from enclave_common.words import counted, some_of
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import listed_in
 from keystore.disk.register_file import describe, read_register
 from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_der
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.given_file import read_given
@@ -116,13 +117,9 @@ def renew(
 
 def _adopt(opened: Store, place: Path) -> None:
     """Take over the list of a host: after a restore from a backup it may know more than this keystore."""
-    listed = listed_in(
-        read_given(place), KeystoreView(opened.root).ca_bundle(Role.IDENTITY), printable(place)
-    )
+    listed = listed_in(read_given(place), KeystoreView(opened.root).ca_bundle(Role.IDENTITY), quoted(place))
     if listed is None:
-        raise InvalidInputError(
-            f"{printable(place)} is not a CRL that an identity CA of this keystore signed"
-        )
+        raise InvalidInputError(f"{quoted(place)} is not a CRL that an identity CA of this keystore signed")
     register = with_crls(opened, [listed])
     with opened.batch() as batch:
         batch.record(register)
@@ -144,7 +141,7 @@ def _still_valid(root: Path, report: ProvisionReport, now: datetime) -> list[str
     return [
         f"{counted(len(earlier), 'earlier certificate')} of {some_of(names, 3)} stay valid until "
         f"{iso(max(one.not_after for one in earlier))}; if a key may have been copied, revoke them: secure-keystore "
-        f"renew {printable(root)} {' '.join(names[:3])}{' ...' if len(names) > 3 else ''} --new-keys --revoke-old"
+        f"renew {quoted(root)} {' '.join(names[:3])}{' ...' if len(names) > 3 else ''} --new-keys --revoke-old"
     ]
 
 

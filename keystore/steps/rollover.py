@@ -19,13 +19,14 @@ from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
+from enclave_common.terminal import quoted
 from enclave_common.words import some_of
 from keystore.add_ons import follow
 from keystore.disk import layout, safe_files, store
 from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.bundle import handover_json
 from keystore.formats.certificate import read_certificate
 from keystore.formats.register import AuthorityState
@@ -171,7 +172,7 @@ def _successors(opened: Store, roles: Collection[Role], access: CaAccess) -> dic
     found = {}
     for role in roles:
         if opened.is_directory(_waiting(role)):
-            place = printable(opened.root / _waiting(role))
+            place = quoted(opened.root / _waiting(role))
             cert = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
             key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
             found[role] = authority_of(read_certificate(cert, place), open_key(key, place, access), place)

@@ -14,13 +14,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_common.terminal import quoted
 from keystore.disk import layout
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import LaunchHold, enclaves_with_shares, is_running, read_shares
 from keystore.disk.signed_documents import governance_domains
 from keystore.disk.store import PRIVATE_MODE, Batch, Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, printable
+from keystore.errors import InvalidInputError
 from keystore.formats.permissions import permissions_document
 from keystore.formats.permissions_names import full_name
 from keystore.formats.policy import EnclavePolicy, Profile, Qualifier
@@ -183,7 +184,7 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
     ]
     if not mine:
         raise InvalidInputError(
-            f"no launch {printable(owner)} has a share in {printable(root)}\n"
+            f"no launch {quoted(owner)} has a share in {quoted(root)}\n"
             f"try: secure-keystore shares {shlex.quote(str(root))}"
         )
     refuse_running(root, (one.enclave for one in mine))
@@ -203,5 +204,5 @@ def refuse_running(root: Path, enclaves: Iterable[str]) -> None:
         for share in read_shares(root, enclave):
             if is_running(root, share.owner):
                 raise InvalidInputError(
-                    f"{printable(share.owner)} is running and uses enclave {enclave}; stop it first"
+                    f"{quoted(share.owner)} is running and uses enclave {enclave}; stop it first"
                 )

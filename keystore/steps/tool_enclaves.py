@@ -9,10 +9,11 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_common.terminal import quoted
 from enclave_common.words import did_you_mean
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import keystore_at
-from keystore.errors import InvalidInputError, printable
+from keystore.errors import InvalidInputError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Policy
@@ -59,12 +60,12 @@ def create_tool_enclave(
     Raises InvalidInputError for a tool or target that cannot be, and what provisioning raises.
     """
     if tool not in TOOLS:
-        raise InvalidInputError(f"{printable(tool)} is not a tool we know; choose from {', '.join(TOOLS)}")
+        raise InvalidInputError(f"{quoted(tool)} is not a tool we know; choose from {', '.join(TOOLS)}")
     kind = TOOLS[tool]
     chosen = tool_targets(kind, tuple(targets))
     enclave = validate_enclave_name(name or tool_enclave_name(kind, chosen))
     if not enclave.startswith(f"{FOLDER}/"):
-        raise InvalidInputError(f"{printable(enclave)}: enclaves of tools are below {FOLDER}/")
+        raise InvalidInputError(f"{quoted(enclave)}: enclaves of tools are below {FOLDER}/")
     given = options or ProvisionOptions()
     if given.lifetime is None and given.valid_until is None:
         given = given._replace(lifetime=DEFAULT_LIFETIME)
@@ -102,7 +103,7 @@ def _unknown_targets(root: Path, targets: Sequence[str]) -> Iterator[str]:
     known = sorted({rule.expression for rule in rules})
     for target in targets if known else ():
         if not any(can_meet(name, target) or name.startswith(f"{target}/") for name in known):
-            yield f"no enclave of this keystore may use {printable(target)}{did_you_mean(target, known)}"
+            yield f"no enclave of this keystore may use {quoted(target)}{did_you_mean(target, known)}"
 
 
 WATCHER = f"{FOLDER}/watch"

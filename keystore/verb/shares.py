@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 
 from enclave_common.command_line import TEXT
-from keystore.errors import printable
+from enclave_common.terminal import quoted
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import drop_shares
 from keystore.steps.sharing import list_shares
@@ -32,8 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     found = list_shares(arguments.keystore)
     lines = (
-        f"{printable(one.owner)}{' (running)' if one.running else ''}: {' '.join(one.enclaves)}"
-        for one in found
+        f"{quoted(one.owner)}{' (running)' if one.running else ''}: {' '.join(one.enclaves)}" for one in found
     )
     common.print_answer(arguments, {"launches": [one._asdict() for one in found]}, lines)
     return 0

@@ -11,8 +11,8 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from enclave_common.command_line import PATH, TEXTS
+from enclave_common.terminal import quoted
 from enclave_common.words import counted
-from keystore.errors import printable
 from keystore.formats.governance_yaml import governance_of
 from keystore.signing.public_key import fingerprints
 from keystore.verb import common
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _lines(report: VerifyReport) -> Iterator[str]:
     for finding in report.findings:
-        yield f"{finding.severity.value}: {printable(finding.place)}: {finding.message} [{finding.code}]"
+        yield f"{finding.severity.value}: {quoted(finding.place)}: {finding.message} [{finding.code}]"
         if finding.repair:
             yield f"    {finding.repair}"
     verdict = "good" if report.is_good else "not good"

@@ -10,18 +10,13 @@ from datetime import datetime
 
 from cryptography import x509
 
+from enclave_common.terminal import quoted
 from enclave_common.words import counted, some_of
 from keystore.disk import layout, safe_files
 from keystore.disk.register_file import needs_register
 from keystore.disk.signed_documents import foreign_document, governance_in_force
 from keystore.disk.view import KeystoreView
-from keystore.errors import (
-    DamagedKeystoreError,
-    KeystoreError,
-    OtherFormError,
-    UnsafeKeystoreError,
-    printable,
-)
+from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, UnsafeKeystoreError
 from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, read_certificate
 from keystore.formats.compact import compact_nodes
 from keystore.formats.domains import Domains
@@ -326,7 +321,7 @@ class _EnclaveCheck:
         if self.facts is None:
             return
         if permissions.subject != subject_name(self.facts.common_name or ""):
-            text = f"for {printable(permissions.subject)}, which is not the subject of cert.pem"
+            text = f"for {quoted(permissions.subject)}, which is not the subject of cert.pem"
             yield self._distrusted("wrong-grant", text)
             return
         yield from self._validity(permissions.validity, self.facts.validity)

@@ -15,10 +15,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from enclave_common.files import read_bytes
+from enclave_common.terminal import quoted
 from keystore.disk import layout, safe_files
 from keystore.disk.container_copies import differing_copies
 from keystore.disk.crl_file import is_crl
-from keystore.errors import DamagedKeystoreError, InvalidEnclaveNameError, printable
+from keystore.errors import DamagedKeystoreError, InvalidEnclaveNameError
 from keystore.formats.certificate import read_certificate, read_certificates
 from keystore.formats.enclave_name import check_distinct, is_enclave_name, validate_enclave_name
 from keystore.formats.role import Role
@@ -95,7 +96,7 @@ def _check_link(root: Path, relative: str) -> Iterator[Finding]:
         yield Finding(Severity.ERROR, "strange-link", relative, message, repair.run_on(root, "rm", relative))
     elif not os.path.exists(root / relative):
         yield Finding(
-            Severity.ERROR, "dangling-link", relative, f"points at {printable(target)}, which is missing",
+            Severity.ERROR, "dangling-link", relative, f"points at {quoted(target)}, which is missing",
             repair.run_on(root, "rm", relative, "or restore what it points at; without a CRL, the revoked are trusted"),
         )  # fmt: skip
 

@@ -164,9 +164,7 @@ def test_many_causes_are_one_gap_and_one_cause_has_one_gap_with_its_places(tmp_p
     )
     often = "acme::Part a(this);\nacme::Part b(this);\nacme::Part c(this);"
     (told,) = gaps(infer(tmp_path / "often", in_class(often)))
-    assert told.startswith(
-        "the node is handed to acme::Part, which may make interfaces on it (3 places: "
-    )
+    assert told.startswith("the node is handed to acme::Part, which may make interfaces on it (3 places: ")
 
 
 BROKEN = (
