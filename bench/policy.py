@@ -14,9 +14,9 @@ from collections.abc import Callable
 from datetime import datetime, timezone
 from time import process_time
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy import RunningNode, derive_policy
 from enclave_launch.report.explained import explain
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
 from keystore.formats.policy_xml import policy_xml
@@ -24,7 +24,6 @@ from keystore.formats.validity import Validity
 from nodl.name_template import NameTemplate
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 from nodl.remap import RemapRules, parse_rule
-from nodl.source_ref import SourceRef
 
 NODES_PER_ENCLAVE = 20
 KINDS = tuple(EndpointKind)
@@ -37,7 +36,7 @@ def nodes(count: int, interfaces: int) -> list[RunningNode]:
 
 
 def _node(index: int, interfaces: int, rules: RemapRules) -> RunningNode:
-    source = SourceRef("share/fleet/fleet.nodl.xml", index + 1)
+    source = SourceLocation("share/fleet/fleet.nodl.xml", index + 1)
     forms = ("chatter{}", "/fleet/state{}", "~/status{}", "sensors/range{}")
     endpoints = tuple(
         Endpoint(KINDS[i % len(KINDS)], NameTemplate.literal(forms[i % 4].format(i)), "x/msg/Y", source)

@@ -15,7 +15,7 @@ from typing import Any, Literal, Optional, TypeVar, Union
 
 from pydantic import BaseModel, Field, StrictBool, StrictFloat, StrictInt, StrictStr
 
-from enclave_launch.source_location import SourceLocation
+from enclave_common.source_location import SourceLocation
 
 Entry = TypeVar("Entry", bound="_Strict")
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from enclave_launch.source_location import SourceLocation
+from enclave_common.source_location import SourceLocation
 from keystore.errors import KeystoreError
 
 

@@ -7,6 +7,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
 from enclave_launch.admission.middleware import (
@@ -21,7 +22,6 @@ from enclave_launch.host.host import HostOptions
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.node_interface import NodeInterface
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.admission.middleware import failing, mixed_pairs
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import (
@@ -51,7 +52,6 @@ from enclave_launch.policy import DerivedPolicy, RunningNode
 from enclave_launch.policy.command_nodes import commands_of
 from enclave_launch.ros_rules.parameter_value import type_name
 from enclave_launch.ros_rules.ros2_command import instead_of
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.subject import common_name
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 
 import enclave_launch.plan_diagnostics as plan_diagnostics
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import some_of
 from enclave_launch.admission import AdmissionOptions, notes, prefix_refusals, refusals
 from enclave_launch.admission.middleware import middleware_of
@@ -38,7 +39,6 @@ from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedCo
 from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy_xml import PolicyDocument
 from nodl.node_interface import RANDOM_ENDING, NodeInterface
-from nodl.source_ref import SourceRef
 
 
 def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
@@ -193,10 +193,10 @@ class _Profiles:
         self, path: str, package: str | None, executable: str | None, plugin: str | None
     ) -> Iterator[NodeInterface]:
         for (ns, node), profile in self._left.get(path, {}).items():
-            place = SourceRef(self._document.file)
+            place = SourceLocation(self._document.file)
             if profile.rules:
                 file, _, line = self._document.places[path, ns, node, profile.rules[0]].rpartition(":")
-                place = SourceRef(file, int(line) if line.isdecimal() else 0)
+                place = SourceLocation(file, int(line) if line.isdecimal() else 0)
             yield NodeInterface(package, executable, plugin, node, ns, (), place)
 
     def _still_missing(self, missing: Missing, path: str) -> Missing:

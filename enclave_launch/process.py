@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.ros_rules.distro import DEFAULT, Release, Since, release_of
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.source_location import SourceLocation
 
 UNSPECIFIED_NODE_NAME = "<node_name_unspecified>"
 UNSPECIFIED_NODE_NAMESPACE = "<node_namespace_unspecified>"

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from nodl.source_ref import SourceRef
+from enclave_common.source_location import SourceLocation
 from nodl.types import Node
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class ExecutableNotFoundError(NoDLError):
 class ConflictingNoDLError(NoDLError):
     """Definitions that contradict each other. ``sources``: the definitions that do not agree."""
 
-    def __init__(self, subject: str, sources: Iterable[SourceRef]):
+    def __init__(self, subject: str, sources: Iterable[SourceLocation]):
         self.sources = tuple(sources)
         listing = "".join(f"\n  {source}" for source in self.sources)
         super().__init__(
@@ -75,10 +75,10 @@ class ConflictingNoDLError(NoDLError):
 class InvalidNoDLError(NoDLError):
     """A document that cannot be used. ``source`` is ``None`` when made through a v1 constructor."""
 
-    source: SourceRef | None = None
+    source: SourceLocation | None = None
 
     @classmethod
-    def at(cls, source: SourceRef, message: str) -> Self:
+    def at(cls, source: SourceLocation, message: str) -> Self:
         """Make the error at a place, whatever the constructor of the v1 API wants."""
         error = cls.__new__(cls)
         NoDLError.__init__(error, f"{source}: {message}")

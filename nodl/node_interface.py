@@ -7,9 +7,9 @@ from enum import Enum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from nodl.endpoint_kind import EndpointKind as EndpointKind
 from nodl.name_template import NameTemplate
-from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from nodl.dependence import Dependence
@@ -40,7 +40,7 @@ class Endpoint(NamedTuple):
     kind: EndpointKind
     name: NameTemplate
     type: str
-    source: SourceRef
+    source: SourceLocation
     certainty: Certainty = Certainty.EXACT
     written: str = ""  # the text in the source where a reader took it for another name, else empty
     introspected: bool = False  # a service whose calls are published below its name (service introspection)
@@ -52,7 +52,7 @@ class Endpoint(NamedTuple):
 class Gap(NamedTuple):
     """Something about the node that could not be found out, and why. Never silently dropped."""
 
-    source: SourceRef
+    source: SourceLocation
     why: str
 
 
@@ -93,7 +93,7 @@ class NodeInterface(NamedTuple):
     name: str | None
     namespace: str | None
     endpoints: tuple[Endpoint, ...]
-    source: SourceRef
+    source: SourceLocation
     library: ClientLibrary = ClientLibrary.UNKNOWN
     lifecycle: bool = False
     parameters: tuple[str, ...] = ()

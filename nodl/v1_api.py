@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import IO
 
 from enclave_common.files import read_bytes
+from enclave_common.source_location import SourceLocation
 from nodl.ament_index import package_share_directory, search_prefixes
 from nodl.document import V1_SUFFIX
 from nodl.document.v1 import parse_v1
 from nodl.errors import DuplicateNodeError, ExecutableNotFoundError, InvalidNoDLError, NoNoDLFilesError
 from nodl.node_interface import Endpoint, ManifestNode
-from nodl.source_ref import SourceRef
 from nodl.types import Action, Node, Parameter, PubSubRole, ServerClientRole, Service, Topic
 
 
@@ -31,7 +31,7 @@ def parse(path: str | Path | IO[bytes] | IO[str]) -> list[Node]:
         try:
             content: bytes | str = read_bytes(file)
         except OSError as error:
-            raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
+            raise InvalidNoDLError.at(SourceLocation(file), f"cannot be read: {error.strerror}") from None
     else:
         file = str(getattr(path, "name", "<stream>"))
         content = path.read()

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import yaml
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from enclave_common.yaml_reader import compose_yaml, construct, line_of
 from nodl.errors import InvalidYAMLError
-from nodl.source_ref import SourceRef
 
 MAX_BYTES = 1_000_000
 MAX_NODES = 100_000
@@ -27,22 +27,22 @@ class YamlScalar(NamedTuple):
     """A scalar with its place."""
 
     value: Scalar
-    source: SourceRef
+    source: SourceLocation
 
 
 class YamlList(NamedTuple):
     """A sequence, and where it is written."""
 
     items: tuple[YamlValue, ...]
-    source: SourceRef
+    source: SourceLocation
 
 
 class YamlMap(NamedTuple):
     """A mapping with its place. ``items`` in document order; ``keys`` says where each key is written."""
 
     items: dict[str, YamlValue]
-    keys: dict[str, SourceRef]
-    source: SourceRef
+    keys: dict[str, SourceLocation]
+    source: SourceLocation
 
     def scalar(self, key: str) -> Scalar:
         """Return the value under ``key``, None if there is none or it is a mapping or list."""
@@ -88,16 +88,18 @@ def plain(value: YamlValue) -> object:
 def parse_yaml(text: bytes, file: str, *, last_counts: bool = False) -> YamlValue:
     """Parse one document; a key given twice is refused unless the ``last_counts``. Raises ``InvalidYAMLError``."""
     if len(text) > MAX_BYTES:
-        raise InvalidYAMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
+        raise InvalidYAMLError.at(SourceLocation(file), f"larger than the allowed {MAX_BYTES} bytes")
     try:
         root = compose_yaml(text.decode("utf-8"))
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
-        raise InvalidYAMLError.at(SourceRef(file, line), f"not well-formed YAML: {error.problem}") from None
+        raise InvalidYAMLError.at(
+            SourceLocation(file, line), f"not well-formed YAML: {error.problem}"
+        ) from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InvalidYAMLError.at(SourceRef(file), f"not readable as YAML: {error}") from None
+        raise InvalidYAMLError.at(SourceLocation(file), f"not readable as YAML: {error}") from None
     if root is None:
-        raise InvalidYAMLError.at(SourceRef(file), "the document is empty")
+        raise InvalidYAMLError.at(SourceLocation(file), "the document is empty")
     return _Builder(file, last_counts).build(root, 0)
 
 
@@ -118,7 +120,7 @@ class _Builder:
         assert isinstance(node, yaml.ScalarNode)  # a node is one of three
         return self._scalar(node, source)
 
-    def _mapping(self, node: yaml.MappingNode, source: SourceRef, depth: int) -> YamlMap:
+    def _mapping(self, node: yaml.MappingNode, source: SourceLocation, depth: int) -> YamlMap:
         result = YamlMap({}, {}, source)
         merged: list[YamlMap] = []
         for key_node, value_node in node.value:
@@ -153,7 +155,7 @@ class _Builder:
             raise InvalidYAMLError.at(value.source, "a key must be text")
         return value.value
 
-    def _scalar(self, node: yaml.ScalarNode, source: SourceRef) -> YamlScalar:
+    def _scalar(self, node: yaml.ScalarNode, source: SourceLocation) -> YamlScalar:
         text = str(node.value)
         if len(text) > _MAX_SCALAR:
             raise InvalidYAMLError.at(source, f"a value is longer than {_MAX_SCALAR} characters")
@@ -166,5 +168,5 @@ class _Builder:
         except (ValueError, OverflowError, yaml.YAMLError):
             raise InvalidYAMLError.at(source, f"{quoted(text[:40])} is not a number we can read") from None
 
-    def _at(self, node: yaml.Node) -> SourceRef:
-        return SourceRef(self._file, line_of(node))
+    def _at(self, node: yaml.Node) -> SourceLocation:
+        return SourceLocation(self._file, line_of(node))

@@ -32,7 +32,6 @@ ALLOWED = {
 # The floors of each package, lowest first: a room imports its own modules and those of the floors below it.
 FLOORS: dict[str, tuple[set[str], ...]] = {
     "enclave_launch": (
-        {"source_location"},
         {"diagnostics"},
         {"ros_rules"},
         {"errors", "process"},
@@ -55,7 +54,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"__init__", "__main__"},
     ),
     "nodl": (
-        {"source_ref", "types", "names", "endpoint_kind"},
+        {"types", "names", "endpoint_kind"},
         {"errors", "remap", "name_template"},
         {"node_interface", "ros_arguments", "yaml_text", "xml_text"},
         {"package_xml"},

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
-from enclave_launch.source_location import SourceLocation
 
 
 def test_a_diagnostic_reads_as_place_text_and_remedy() -> None:

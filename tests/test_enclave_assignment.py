@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch import EnclaveScope, LaunchFileError
 from enclave_launch.enclave import AssignmentReason, assign_enclave
 from enclave_launch.process import EnclaveRequest, ProcessKind, ResolvedProcess
-from enclave_launch.source_location import SourceLocation
 
 
 def process(

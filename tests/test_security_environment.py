@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch import UsageError
 from enclave_launch.admission.variables import domain_of
 from enclave_launch.enclave import AssignmentReason, EnclaveAssignment
@@ -15,7 +16,6 @@ from enclave_launch.security_environment import (
     SecuritySettings,
     secured_environment,
 )
-from enclave_launch.source_location import SourceLocation
 
 
 @pytest.mark.parametrize(("text", "domain"), [("", 0), ("0", 0), ("42", 42), ("007", 7), ("230", 230)])

@@ -18,8 +18,8 @@ from enclave_addons.inference.python.check import may_make_interfaces, unsettled
 from enclave_addons.inference.python.program import Program
 from enclave_addons.inference.python.run import Run
 from enclave_addons.inference.start import LaunchKey, Progress
+from enclave_common.source_location import SourceLocation
 from nodl.node_interface import ClientLibrary, Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 Found = TypeVar("Found")
 CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".cu", ".hpp", ".hh", ".hxx", ".h", ".cuh")
@@ -106,7 +106,7 @@ def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[G
     try:
         return list(analyse())
     except Exception as error:
-        failed.append(Gap(SourceRef(file), failure(error)))
+        failed.append(Gap(SourceLocation(file), failure(error)))
         return []
 
 
@@ -120,7 +120,7 @@ def _cpp(files: list[str], progress: Progress | None) -> tuple[list[NodeInterfac
     try:
         inferred = infer_sources(files, progress=progress)
     except CppSupportMissing as error:
-        return [], [Gap(SourceRef(files[0]), str(error))]
+        return [], [Gap(SourceLocation(files[0]), str(error))]
     return inferred.nodes, inferred.gaps
 
 

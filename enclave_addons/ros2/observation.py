@@ -11,6 +11,7 @@ from launch.descriptions import executable as executable_description
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
 from enclave_common.shell_words import split_words
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description.actions.processes import first_word
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
@@ -22,7 +23,6 @@ from enclave_launch.process import (
 )
 from enclave_launch.ros_rules.namespaces import enclave_scope
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
-from enclave_launch.source_location import SourceLocation
 from nodl.ros_arguments import parse_ros_arguments, words_after_program
 
 ATTRIBUTE = "_enclave_launch_enclave"

@@ -21,6 +21,7 @@ from types import FrameType, ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from enclave_common.files import read_text
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.location import OUTSIDE, location_of
 from enclave_launch.description.substitution import OpaqueValueUsed, Substitution
@@ -28,7 +29,6 @@ from enclave_launch.diagnostics.evaluation import module_not_installed
 from enclave_launch.host.current import current_host
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.process import Unforeseeable
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext

@@ -9,6 +9,7 @@ from enum import Enum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description import read_only
 from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.events.event import ExecutionComplete
@@ -16,7 +17,6 @@ from enclave_launch.description.location import location_of
 from enclave_launch.description.substitution import OpaqueValueUsed
 from enclave_launch.host.user_code import executed_once, is_users
 from enclave_launch.process import Unforeseeable
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.frontend import error_location
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.substitution import (
@@ -18,7 +19,6 @@ from enclave_launch.diagnostics.evaluation import node_name_repeated
 from enclave_launch.process import RemapRule as ResolvedRule
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute as make_namespace_absolute
 from enclave_launch.ros_rules.namespaces import prefix_namespace as prefix_namespace
-from enclave_launch.source_location import SourceLocation
 from nodl import names
 
 

@@ -9,8 +9,8 @@ from enum import Enum
 from itertools import groupby
 from typing import NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import some_of
-from enclave_launch.source_location import SourceLocation
 
 
 class Code(str, Enum):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import some_of
 from enclave_launch.diagnostics import Code, Diagnostic
-from enclave_launch.source_location import SourceLocation
 
 
 def container_elsewhere(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from enclave_common.words import did_you_mean
 from enclave_launch.diagnostics import Code, Diagnostic
-from enclave_launch.source_location import SourceLocation
 
 _LONGEST_PATH = 500  # characters
 

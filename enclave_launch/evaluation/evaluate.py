@@ -12,6 +12,7 @@ import enclave_common
 import enclave_launch
 import keystore
 import nodl
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import did_you_mean
 from enclave_launch.description.actions.includes import IncludeLaunchDescription
 from enclave_launch.description.argument_scan import check_is_description
@@ -37,7 +38,6 @@ from enclave_launch.host.environment import environment_untouched
 from enclave_launch.host.host import Host
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.process import Evaluation
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.diagnostics import Diagnostic

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from types import TracebackType
 
-from enclave_launch.source_location import SourceLocation
+from enclave_common.source_location import SourceLocation
 
 _ATTRIBUTE = "enclave_launch_location"
 

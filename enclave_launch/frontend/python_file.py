@@ -12,8 +12,8 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from enclave_common.files import check_regular, read_bytes
+from enclave_common.source_location import SourceLocation
 from enclave_launch.frontend.error_location import frames
-from enclave_launch.source_location import SourceLocation
 
 MODULE_NAME = "python_launch_file"
 

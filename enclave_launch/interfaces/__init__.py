@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import counted
 from enclave_launch.errors import ManifestError, UsageError, translated
 from enclave_launch.interfaces.describers import (
@@ -30,7 +31,6 @@ from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProces
 from nodl.errors import ConflictingNoDLError, NoDLError, NoManifestError
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.node_interface import ClientLibrary, NodeInterface
-from nodl.source_ref import SourceRef
 
 SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
 """Folders with sources of compiled nodes, separated as in ``PATH``; after those that ``--source`` names."""
@@ -234,7 +234,7 @@ def _container(subject: _Subject) -> NodeInterface:
         name=_CONTAINER_NODE_NAME,
         namespace=None,
         endpoints=(),
-        source=SourceRef("rclcpp_components, a container"),
+        source=SourceLocation("rclcpp_components, a container"),
         library=ClientLibrary.RCLCPP,
         parameter_services=False,  # component_manager.hpp: nor the publisher of parameter events
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy.program_inputs import (
     ProgramInputs,
     environment_inputs,
@@ -25,7 +26,6 @@ from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from nodl.dependence import COMPONENT, CONTROLLER, HOST, Situation
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
-from nodl.source_ref import SourceRef
 
 
 def situation_of(
@@ -96,7 +96,7 @@ class StartedProgram:
             name=node or "unnamed",
             namespace="/",
             endpoints=(),
-            source=SourceRef(str(started.location)),
+            source=SourceLocation(str(started.location)),
         )
         return situation_of(started, self._container, interface, self._distro)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, ResolvedProcess
 from enclave_launch.ros_rules.ros2_command import (
     CommandNode,
@@ -17,7 +18,6 @@ from enclave_launch.ros_rules.ros2_command import (
 )
 from nodl.name_template import NameTemplate
 from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
-from nodl.source_ref import SourceRef
 
 DAEMON_NAME = "_ros2cli_daemon_*"
 """The end is the domain and a random number."""
@@ -57,7 +57,7 @@ def interfaces_of_command(
     node = command_node(command)
     if node is None:
         return None
-    source = SourceRef(process.location.file, process.location.line)
+    source = SourceLocation(process.location.file, process.location.line)
     interfaces = [_interface(node, source)]
     if node.asks_daemon:
         interfaces.append(_interface(CommandNode(DAEMON_NAME, ()), source))
@@ -76,7 +76,7 @@ def _as_node(process: ResolvedProcess, executable: str) -> ResolvedProcess:
     )
 
 
-def _interface(node: CommandNode, source: SourceRef) -> NodeInterface:
+def _interface(node: CommandNode, source: SourceLocation) -> NodeInterface:
     return NodeInterface(
         package=None,
         executable="ros2",

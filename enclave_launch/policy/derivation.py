@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Literal, NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import (
     permissions_large,
@@ -25,7 +26,6 @@ from enclave_launch.diagnostics.permissions import (
 from enclave_launch.policy.node_permissions import NodePermissions, PolicyOptions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.ros_rules.distro import Version
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
 from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import can_meet

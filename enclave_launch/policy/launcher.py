@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.process import LauncherCall
 from nodl.name_template import NameTemplate
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
 from nodl.remap import RemapRules
-from nodl.source_ref import SourceRef
 
 LAUNCHER_NODE = "launcher"
 LAUNCHER_ENCLAVE = "/launcher"
@@ -23,7 +23,7 @@ def launcher_node(calls: Sequence[LauncherCall]) -> RunningNode:
     """Return the node that makes ``calls``; a client of transitions also follows ``transition_event``."""
     endpoints: list[Endpoint] = []
     for call in calls:
-        source = SourceRef(call.location.file, call.location.line)
+        source = SourceLocation(call.location.file, call.location.line)
         endpoints.append(_endpoint(EndpointKind.SERVICE_CLIENT, call.service, call.type, source))
         node, _, service = call.service.rpartition("/")
         if service == "change_state" and call.type == _CHANGE_STATE:
@@ -37,11 +37,11 @@ def launcher_node(calls: Sequence[LauncherCall]) -> RunningNode:
         name=name,
         namespace="/",
         endpoints=tuple(dict.fromkeys(endpoints)),
-        source=SourceRef(place.file, place.line),
+        source=SourceLocation(place.file, place.line),
         library=ClientLibrary.RCLPY,
     )
     return RunningNode(interface, name, name, "/", RemapRules(), {}, LAUNCHER_ENCLAVE, place, role="launcher")
 
 
-def _endpoint(kind: EndpointKind, name: str, type_name: str, source: SourceRef) -> Endpoint:
+def _endpoint(kind: EndpointKind, name: str, type_name: str, source: SourceLocation) -> Endpoint:
     return Endpoint(kind, NameTemplate.literal(name), type_name, source)

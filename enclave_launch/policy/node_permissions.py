@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import Literal, NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import (
     action_remap_idle,
@@ -20,7 +21,6 @@ from enclave_launch.diagnostics.permissions import (
 )
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.ros_rules.distro import Version, moves_whole_actions
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from keystore.formats.policy_xml import PolicyDocument
 from nodl.builtin_interfaces import BuiltinCondition, built_in_interfaces

@@ -13,12 +13,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.policy.program_inputs import ProgramInputs, environment_inputs, program_inputs
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
-from enclave_launch.source_location import SourceLocation
 from nodl.names import join
 from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import counted
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
@@ -14,7 +15,6 @@ from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.terminal_style import TerminalStyle
 from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_enclave
 from enclave_launch.ros_rules.distro import since_text
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy
 
 _LABELS: dict[str, str] = {listed: operation.verb for operation, listed in LIST_NAMES.items()}

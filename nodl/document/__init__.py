@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from enclave_common.files import read_bytes
+from enclave_common.source_location import SourceLocation
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
 from nodl.document.v2_include import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document
 from nodl.errors import InvalidNoDLError
 from nodl.node_interface import ManifestNode
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlMap, parse_yaml
 
 __all__ = [
@@ -66,7 +66,7 @@ def _read(file: str) -> bytes:
     try:
         return read_bytes(file, _MAX_BYTES)
     except OSError as error:
-        raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
+        raise InvalidNoDLError.at(SourceLocation(file), f"cannot be read: {error.strerror}") from None
 
 
 def _stem(file: str) -> str:

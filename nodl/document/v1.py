@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from enclave_common.xml_tree import XmlElement
 from nodl.document.v2_schema import plain_types
@@ -27,7 +28,6 @@ from nodl.names import (
     validate_written_name,
 )
 from nodl.node_interface import Endpoint, EndpointKind, ManifestNode, NodeInterface
-from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
 
 VERSION = 1
@@ -164,5 +164,5 @@ def _expect_no_elements(element: XmlElement, file: str) -> None:
         )
 
 
-def _at(element: XmlElement, file: str) -> SourceRef:
-    return SourceRef(file, element.sourceline)
+def _at(element: XmlElement, file: str) -> SourceLocation:
+    return SourceLocation(file, element.sourceline)

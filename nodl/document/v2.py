@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from enclave_common.source_location import SourceLocation
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_names, logger_services
 from nodl.document.v2_schema import check_document, plain_types
@@ -25,7 +26,6 @@ from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, validate_namespace, validate_node_name, validate_written_name
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, ManifestNode, NodeInterface
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlMap, parse_yaml
 
 VERSION = 2
@@ -82,7 +82,7 @@ def _identified(root: YamlMap, file: str, package: str | None, name: str) -> Nod
         name=node or _node_name_from(name),
         namespace=namespace or None,
         endpoints=(),
-        source=SourceRef(file, 1),
+        source=SourceLocation(file, 1),
         library=ClientLibrary(section.text("library") or "unknown"),
         lifecycle=section.scalar("lifecycle") is True,
         parameter_services=section.scalar("parameter_services") is not False,
@@ -102,7 +102,7 @@ def _endpoints(
     documents: Sequence[Included], learnt: Mapping[tuple[str, str], LearntName]
 ) -> Iterator[Endpoint]:
     for category, kind in CATEGORIES.items():
-        seen: dict[str, SourceRef] = {}
+        seen: dict[str, SourceLocation] = {}
         for entry in (each for document in documents for each in document.root.mappings(category)):
             name, source, type_name = entry.text("name"), entry.items["name"].source, entry.text("type")
             try:
@@ -153,7 +153,7 @@ def _full_type(type_name: str, kind: EndpointKind) -> str:
 
 def _parameters(documents: Sequence[Included]) -> dict[str, str]:
     found: dict[str, str] = {}
-    first: dict[str, SourceRef] = {}
+    first: dict[str, SourceLocation] = {}
     for document in documents:
         section = document.root.mapping("parameters")
         for name, source in section.keys.items():

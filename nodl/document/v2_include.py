@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.files import read_bytes
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from nodl.ament_index import INDEX_FOLDER, find_resource
 from nodl.document.v2_schema import check_document
 from nodl.errors import IncludeError
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import MAX_BYTES, YamlMap, parse_yaml
 
 RESOURCE_TYPE = "nodl"  # of v2 documents in the ament index
@@ -47,7 +47,9 @@ class _Walk:
         for entry in root.mappings("include"):
             yield from self._one(entry.text("ref"), entry.items["ref"].source, origin, chain)
 
-    def _one(self, ref: str, source: SourceRef, origin: Path, chain: tuple[str, ...]) -> Iterator[Included]:
+    def _one(
+        self, ref: str, source: SourceLocation, origin: Path, chain: tuple[str, ...]
+    ) -> Iterator[Included]:
         path = self._resolve(ref, source, origin)
         here = (*chain, ref)
         if path in self._visited:
@@ -63,7 +65,7 @@ class _Walk:
         yield Included(str(path), root)
         yield from self.of(root, path, here)
 
-    def _resolve(self, ref: str, source: SourceRef, origin: Path) -> Path:
+    def _resolve(self, ref: str, source: SourceLocation, origin: Path) -> Path:
         scheme, _, rest = ref.partition("://")
         if scheme == "nodl":
             return self._from_index(rest, source)
@@ -73,7 +75,7 @@ class _Walk:
             source, f"{quoted(ref)}: only nodl://<package>/<name> and local://<path> are known"
         )
 
-    def _from_index(self, body: str, source: SourceRef) -> Path:
+    def _from_index(self, body: str, source: SourceLocation) -> Path:
         package, _, name = body.partition("/")
         if not _PACKAGE_OR_NAME.match(package) or not _PACKAGE_OR_NAME.match(name):
             raise IncludeError.at(source, f"{quoted('nodl://' + body)} is not nodl://<package>/<name>")
@@ -91,7 +93,7 @@ class _Walk:
         return Path(prefix, INDEX_FOLDER, RESOURCE_TYPE, key).resolve()
 
 
-def _local(body: str, source: SourceRef, origin: Path) -> Path:
+def _local(body: str, source: SourceLocation, origin: Path) -> Path:
     if body.startswith("/") or "\\" in body or not body.isprintable():
         raise IncludeError.at(source, f"{quoted('local://' + body)} must be a relative path")
     path = (origin.parent / body).resolve()
@@ -111,7 +113,7 @@ def package_root(document: Path) -> Path:
     return document.parent
 
 
-def _read(path: Path, source: SourceRef) -> bytes:
+def _read(path: Path, source: SourceLocation) -> bytes:
     try:
         return read_bytes(path, MAX_BYTES)
     except OSError as error:

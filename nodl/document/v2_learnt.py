@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import counted
 from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.document.v2_section import section_of
@@ -31,7 +32,6 @@ from nodl.errors import InvalidElementError
 from nodl.name_template import PARAMETER_REFERENCE, NameTemplate, ParameterPart, Part
 from nodl.names import InvalidNameError, validate_name
 from nodl.node_interface import Endpoint, EndpointKind
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlMap
 
 ONE_RUN = "one run"
@@ -83,7 +83,7 @@ def logger_services(root: YamlMap) -> Iterator[Endpoint]:
             yield Endpoint(EndpointKind.SERVICE_SERVER, template, type_name, source)
 
 
-def _template(row: YamlMap, place: SourceRef) -> NameTemplate:
+def _template(row: YamlMap, place: SourceLocation) -> NameTemplate:
     parameter = row.text("parameter")
     if not parameter:
         return _fixed(row.text("written") or row.text("name"), place)
@@ -111,7 +111,7 @@ def _readings(row: YamlMap) -> Iterator[NameTemplate]:
     yield from (_template(each, row.source) for each in row.mappings("candidates"))
 
 
-def _fixed(name: str, place: SourceRef) -> NameTemplate:
+def _fixed(name: str, place: SourceLocation) -> NameTemplate:
     try:
         validate_name(name)
     except InvalidNameError as error:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch import LaunchFileError
 from enclave_launch.policy.running_node import node_of_component, node_of_process
 from enclave_launch.process import Evaluation, ResolvedProcess
 from nodl.ament_index import PackageNotFoundError
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
-from nodl.source_ref import SourceRef
 
 Evaluate = Callable[..., Evaluation]
 
@@ -51,7 +51,7 @@ def test_remap_rules_know_their_place(launched: Evaluate) -> None:
     assert (component.location.line, component.location.element) == (8, "composable_node")
 
 
-NODE = NodeInterface("pk", "e", None, "n", None, (), SourceRef("pk.nodl.xml", 1))
+NODE = NodeInterface("pk", "e", None, "n", None, (), SourceLocation("pk.nodl.xml", 1))
 
 
 def origins(process: ResolvedProcess) -> list[tuple[str, str]]:

@@ -7,13 +7,12 @@ from typing import Any
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy import RunningNode
 from enclave_launch.policy.running_node import Role
-from enclave_launch.source_location import SourceLocation
 from nodl.name_template import NameTemplate
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
 from nodl.remap import RemapRules, parse_rule
-from nodl.source_ref import SourceRef
 
 KINDS = {
     "pub": EndpointKind.PUBLISHER,
@@ -49,7 +48,7 @@ def make_node(
         local=tuple(parse_rule(text, "load.launch.xml:9") for text in local),
         process=tuple(parse_rule(text, "demo.launch.xml:7") for text in remap),
     )
-    source = SourceRef("demo.nodl.xml")
+    source = SourceLocation("demo.nodl.xml")
     node = NodeInterface("demo", original, None, original, None, found, source, library=library, **interface)
     location = SourceLocation("demo.launch.xml", 5, "node")
     return RunningNode(node, original, name, namespace, rules, parameters or {}, enclave, location, role)
@@ -57,7 +56,7 @@ def make_node(
 
 def _endpoint(text: str, line: int) -> Endpoint:
     kind, _, name = text.partition(" ")
-    return Endpoint(KINDS[kind], NameTemplate.literal(name), "x/msg/Y", SourceRef("demo.nodl.xml", line))
+    return Endpoint(KINDS[kind], NameTemplate.literal(name), "x/msg/Y", SourceLocation("demo.nodl.xml", line))
 
 
 @pytest.fixture

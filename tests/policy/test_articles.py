@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch import EnclaveScope
 from enclave_launch.enclave import assign_enclave
 from enclave_launch.policy import DerivedPolicy, derive_policy
@@ -17,7 +18,6 @@ from enclave_launch.process import (
     RemapRule,
     ResolvedProcess,
 )
-from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy_xml import policy_xml
 from nodl.lookup import ManifestLookup
 from tests.programs import install_package

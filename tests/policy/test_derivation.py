@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
 from keystore import Domains, Validity
 from keystore.formats.permissions import permissions_document
@@ -18,7 +19,6 @@ from nodl.builtin_interfaces import DISTROS, TABLE, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap
-from nodl.source_ref import SourceRef
 
 NodeMaker = Callable[..., RunningNode]
 START = datetime(2026, 1, 1, tzinfo=timezone.utc)
@@ -263,7 +263,7 @@ def test_a_name_as_long_as_dds_takes_is_granted_and_a_longer_one_is_not(node: No
 
 def endpoint(*parts: str | ParameterPart | UnknownPart, certainty: Certainty = Certainty.EXACT) -> Endpoint:
     return Endpoint(
-        EndpointKind.PUBLISHER, NameTemplate(parts), "x/msg/Y", SourceRef("talker.py", 12), certainty
+        EndpointKind.PUBLISHER, NameTemplate(parts), "x/msg/Y", SourceLocation("talker.py", 12), certainty
     )
 
 
@@ -363,7 +363,7 @@ def test_a_wildcard_in_a_parameter_value_is_no_way_around(node: NodeMaker) -> No
 
 
 def test_gaps_of_inference_are_problems(node: NodeMaker) -> None:
-    gap = Gap(SourceRef("talker.py", 30), "eval() cannot be followed")
+    gap = Gap(SourceLocation("talker.py", 30), "eval() cannot be followed")
     (problem,) = derive(node(gaps=(gap,))).problems
     assert str(problem).startswith(
         "talker.py:30: node /talker: eval() cannot be followed; let it run once with --learn"

@@ -7,20 +7,19 @@ from pathlib import Path
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy import PolicyOptions, RunningNode, derive_policy
 from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.policy.launcher import LAUNCHER_ENCLAVE, launcher_node
 from enclave_launch.policy.sharing import gains_by_sharing
 from enclave_launch.process import LauncherCall
 from enclave_launch.report.explained import explain
-from enclave_launch.source_location import SourceLocation
 from keystore import read_policy
 from keystore.formats.permissions import dds_rules
 from keystore.formats.policy_xml import PolicyDocument, parse_policy
 from nodl.document.v1 import parse_v1
 from nodl.name_template import NameTemplate, UnknownPart
 from nodl.node_interface import Endpoint, EndpointKind
-from nodl.source_ref import SourceRef
 
 NodeMaker = Callable[..., RunningNode]
 
@@ -162,7 +161,10 @@ def test_enclaves_that_this_launch_does_not_use_are_left_out(node: NodeMaker) ->
 
 def test_a_policy_file_can_answer_for_a_name_that_nobody_knows(node: NodeMaker) -> None:
     unknown = Endpoint(
-        EndpointKind.PUBLISHER, NameTemplate((UnknownPart("a loop"),)), "x/msg/Y", SourceRef("talker.py", 3)
+        EndpointKind.PUBLISHER,
+        NameTemplate((UnknownPart("a loop"),)),
+        "x/msg/Y",
+        SourceLocation("talker.py", 3),
     )
     options = PolicyOptions(policy_file=document('<topics publish="ALLOW"><topic>/loop1</topic></topics>'))
     derived = derive_policy([node(unknown)], distro="humble", options=options)

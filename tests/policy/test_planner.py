@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch import EnclaveScope, LaunchPlan
 from enclave_launch.diagnostics import Code
 from enclave_launch.evaluation.evaluate import evaluate
@@ -24,7 +25,6 @@ from enclave_launch.planner import make_plan
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from keystore import Operation
 from nodl.node_interface import RANDOM_ENDING, Gap
-from nodl.source_ref import SourceRef
 
 from .conftest import make_node
 
@@ -140,7 +140,7 @@ def test_an_enclave_of_which_no_node_is_known_stands_in_the_policy(plan: Plan) -
 
 
 def test_what_the_policy_cannot_say_is_a_problem_of_the_plan(plan: Plan) -> None:
-    gap = Gap(SourceRef("talker.py", 3), "one more name, from the network")
+    gap = Gap(SourceLocation("talker.py", 3), "one more name, from the network")
     made = plan(NODE.format(""), {"talker": Found((TALKER._replace(gaps=(gap,)),))})
     assert ["from the network" in problem.text for problem in made.problems] == [True]
 

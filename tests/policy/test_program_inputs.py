@@ -6,16 +6,15 @@ from collections.abc import Mapping
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.policy import DerivedPolicy, derive_policy
 from enclave_launch.policy.program_inputs import program_inputs
 from enclave_launch.policy.running_node import node_of_process
 from enclave_launch.process import EnclaveRequest, ResolvedProcess
-from enclave_launch.source_location import SourceLocation
 from nodl.name_template import NameTemplate, ParameterPart
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
-from nodl.source_ref import SourceRef
 
-HERE = SourceRef("talker.py", 9)
+HERE = SourceLocation("talker.py", 9)
 
 
 def process(*arguments: str, environment: Mapping[str, str] | None = None) -> ResolvedProcess:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch import LaunchFileError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
@@ -14,7 +15,6 @@ from enclave_launch.policy import RunningNode
 from enclave_launch.policy.running_node import UnknownNodeName, node_of_component, node_of_process
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 from .conftest import make_node
 
@@ -110,7 +110,7 @@ def test_whether_a_node_listens_is_asked_where_launch_gives_it_something(
     for name in ("talker", "other"):
         (tmp_path / f"{name}.yaml").write_text(f"{name}: {{ros__parameters: {{rate: 1}}}}\n")
     children = children.format(folder=tmp_path)
-    known = Gap(SourceRef("talker.py", 3), "known before")
+    known = Gap(SourceLocation("talker.py", 3), "known before")
     node = process_node(tmp_path, interface(global_arguments=None, gaps=(known,)), attributes, children)
     assert node.interface.gaps[0] == known
     assert ["use_global_arguments" in gap.why for gap in node.interface.gaps[1:]] == [True] * open_question

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.process import EnclaveRequest, RemapRule, ResolvedComponent, ResolvedProcess
 from enclave_launch.runtime.gate import LateProcess, PlannedGate, StartAdditions, identity
-from enclave_launch.source_location import SourceLocation
 
 PLACE = SourceLocation("demo.launch.py", 12, "node")
 

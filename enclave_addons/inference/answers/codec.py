@@ -14,16 +14,16 @@ from enclave_addons.inference.answers.folder import CacheFolder
 from enclave_addons.inference.cpp.entry import Entry, FixedMapping, Solved
 from enclave_addons.inference.cpp.reading.built import Definitions
 from enclave_addons.inference.start import InferredProgram, LaunchKey
+from enclave_common.source_location import SourceLocation
 from nodl.dependence import Dependence, Test, Variation, When
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 _RECORDS: dict[str, Callable[..., Any]] = {
     each.__name__: each
     for each in (
         Definitions, Dependence, Endpoint, Entry, Gap, InferredProgram, LaunchKey, NameTemplate, NodeInterface,
-        ParameterPart, Solved, SourceRef, Test, UnknownPart, Variation, When,
+        ParameterPart, Solved, SourceLocation, Test, UnknownPart, Variation, When,
     )
 }  # fmt: skip
 _ENUMERATIONS: dict[str, type[Enum]] = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from enclave_addons.inference.cpp.engine.values import BOTTOM, Text, Value, join
+from enclave_common.source_location import SourceLocation
 from nodl.dependence import ALWAYS, When
 from nodl.node_interface import EndpointKind
-from nodl.source_ref import SourceRef
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class PossibleEndpoint:
     kind: EndpointKind
     name: Text
     type: str
-    source: SourceRef
+    source: SourceLocation
     exact: bool = True
     follows: Follows | None = None
     when: When = ALWAYS
@@ -40,7 +40,7 @@ class AllocatedNode:
     ``of_process``: it is made without the options that a container gives.
     ``parameter_services``: they, or its parameter events, are not certainly switched off."""
 
-    source: SourceRef
+    source: SourceLocation
     lifecycle: bool
     parameters: dict[str, Value] = field(default_factory=dict)
     overrides: dict[str, Value] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class AllocatedNode:
     namespaces: Value = BOTTOM
     endpoints: dict[PossibleEndpoint, None] = field(default_factory=dict)
     unconditional: set[PossibleEndpoint] = field(default_factory=set)
-    gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
+    gaps: dict[tuple[SourceLocation, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True
     of_process: bool = False
@@ -65,5 +65,5 @@ class AllocatedNode:
         given: Value = self.overrides.get(name) or self.parameters.get(name, BOTTOM)
         return given
 
-    def gap(self, source: SourceRef, why: str) -> None:
+    def gap(self, source: SourceLocation, why: str) -> None:
         self.gaps.setdefault((source, why))

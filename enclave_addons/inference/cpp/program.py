@@ -41,7 +41,7 @@ from enclave_addons.inference.cpp.reading.project import SourcePackage, Workspac
 from enclave_addons.inference.cpp.reading.type_names import Type
 from enclave_addons.inference.start import Start
 from enclave_common.files import read_bytes
-from nodl.source_ref import SourceRef
+from enclave_common.source_location import SourceLocation
 
 MAX_FILE_SIZE = 2_000_000
 _REGISTERED = re.compile(
@@ -55,7 +55,7 @@ class ProgramFindings:
     """What one program makes. ``classes``: the node classes that it makes objects of."""
 
     nodes: list[AllocatedNode]
-    gaps: tuple[tuple[SourceRef, str], ...]
+    gaps: tuple[tuple[SourceLocation, str], ...]
     answers: list[SiteAnswer]
     classes: set[str]
     files: tuple[str, ...]
@@ -241,16 +241,16 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
     return _findings(run, sources)
 
 
-def _header_of_ros_1(files: Sequence[FileIndex]) -> SourceRef | None:
+def _header_of_ros_1(files: Sequence[FileIndex]) -> SourceLocation | None:
     """Return where a program that has no header of rclcpp includes that of roscpp."""
     if any(name.startswith("rcl") for index in files for name in index.source.foreign):
         return None
     lines = ((index.file, index.source.foreign.get("ros/ros.h")) for index in files)
-    return next((SourceRef(file, line) for file, line in lines if line is not None), None)
+    return next((SourceLocation(file, line) for file, line in lines if line is not None), None)
 
 
-def _place(entry: Entry) -> SourceRef:
-    return SourceRef(entry.files[0] if entry.files else entry.place)
+def _place(entry: Entry) -> SourceLocation:
+    return SourceLocation(entry.files[0] if entry.files else entry.place)
 
 
 def _possible_plugins(sources: Sources, files: Iterable[FileIndex]) -> list[str]:
@@ -305,13 +305,13 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
     index = next((run.names.files[f] for f in entry.files if f in run.names.files), None)
     if index is None:
         why = f"the source of component {entry.cls} was not found in its package"
-        run.gap_at(SourceRef(entry.place), why)
+        run.gap_at(SourceLocation(entry.place), why)
         return
     kind = run.names.resolve(entry.cls, (), index)
     cls = run.names.class_of(kind, (), index)
     if cls is None:
         why = f"the class {entry.cls} was not found in the sources of its library"
-        run.gap_at(SourceRef(index.file), why)
+        run.gap_at(SourceLocation(index.file), why)
         return
     frame = Frame(cls.file, ())
     host = host_of(run, cls, frame) if entry.instance else None
@@ -352,11 +352,11 @@ def _findings(run: Machine, sources: Sources) -> ProgramFindings:
             run.gap_at(source, f"{what} was never seen to be set: what {name}() makes is not known")
     for cls in run.names.doubts.values():
         why = f"which specialisation of {cls.qualified} is meant is not known"
-        run.gap_at(SourceRef(cls.file.file, cls.line), why)
+        run.gap_at(SourceLocation(cls.file.file, cls.line), why)
     for index in run.names.files.values():
         _text_gaps(run, index)
     for file, why in sources.unreadable.items():
-        run.gap_at(SourceRef(file), why)
+        run.gap_at(SourceLocation(file), why)
     return ProgramFindings(
         nodes=nodes,
         gaps=tuple(run.gaps),
@@ -377,17 +377,17 @@ def _text_gaps(run: Machine, index: FileIndex) -> None:
             each for word in _CALLED.findall(written) for each in run.names.functions_by_name.get(word, ())
         ]
         if CREATES.search(written) or any(map(run.leading.function, called)):
-            run.gap_at(SourceRef(index.file, line), "this C++ could not be parsed")
+            run.gap_at(SourceLocation(index.file, line), "this C++ could not be parsed")
     lines = index.source.text.split("\n")
     for line, name in index.source.unknown_macros:
         if not _NODE.search(lines[line - 1]):
             continue
         why = f"the macro {name} is not in reach: what it stands for is not known"
-        run.gap_at(SourceRef(index.file, line), why)
+        run.gap_at(SourceLocation(index.file, line), why)
     for line, name, body in index.source.open_macros:
         if run.leading.of_words(frozenset(_WORD.findall(body))):
             why = f"what the macro {name} stands for here is not known; it may make interfaces"
-            run.gap_at(SourceRef(index.file, line), why)
+            run.gap_at(SourceLocation(index.file, line), why)
 
 
 _NODE = re.compile(r"\b(?:this|\w*[Nn]ode\w*)\b")

@@ -20,8 +20,8 @@ from enclave_addons.inference.cpp.results import interfaces_of, program_gaps
 from enclave_addons.inference.cpp.syntax import text
 from enclave_addons.inference.start import LaunchKey, Progress, Start
 from enclave_common.files import text_or_nothing
+from enclave_common.source_location import SourceLocation
 from nodl.node_interface import Gap
-from nodl.source_ref import SourceRef
 
 MAX_NESTING = 6_000
 """Of our own calls: some twenty for each call of the program that is followed, which nest up to 60 deep."""
@@ -43,7 +43,7 @@ def solve(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None = 
     except CppSupportMissing:
         raise
     except Exception as error:
-        place = SourceRef(entry.files[0] if entry.files else entry.place)
+        place = SourceLocation(entry.files[0] if entry.files else entry.place)
         gap = Gap(place, failure("the analysis of this program", error))
         return Made(Solved(gaps=(gap,)), {name: digest_of(name) for name in entry.files}, lasting=False)
 

@@ -24,10 +24,10 @@ from enclave_addons.inference.cpp.syntax import check_support
 from enclave_addons.inference.packages import read_package
 from enclave_addons.inference.start import LaunchKey, Progress, Start
 from enclave_common.files import text_or_nothing
+from enclave_common.source_location import SourceLocation
 from enclave_common.words import did_you_mean, some_of
 from nodl.dependence import COMPONENT, HOST
 from nodl.node_interface import Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 _NAMED = 5  # programs of a package in a message
 _TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "example", "mock"})
@@ -80,7 +80,7 @@ def _infer(
             raise
         except Exception as error:
             lasting, why = False, failure("the search for C++ programs", error)
-            found.append(Solved(gaps=(Gap(SourceRef(files[0]), why),)))
+            found.append(Solved(gaps=(Gap(SourceLocation(files[0]), why),)))
             return []
         answered = solve_all(sources, answers, listed, progress)
         for each in answered:
@@ -405,7 +405,7 @@ def _on_host(solved: Solved, package: SourcePackage, name: str) -> Answer:
             name=HOST,
             namespace=None,
             endpoints=(),
-            source=SourceRef(package.folder),
+            source=SourceLocation(package.folder),
             gaps=() if others else solved.gaps,  # the first of them has those of the program
         )
     return Answer((host, *others), consulted=solved.consulted)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from enclave_addons.inference.kernel.values import BOTTOM, Value, join
+from enclave_common.source_location import SourceLocation
 from nodl.node_interface import EndpointKind, Gap, QosPolicies
-from nodl.source_ref import SourceRef
 
 MAX_CAUSES = 10
 SHOWN_PLACES = 3
@@ -20,7 +20,7 @@ class FoundEndpoint(NamedTuple):
     kind: EndpointKind
     name: object
     type: str
-    source: SourceRef
+    source: SourceLocation
     qos: QosPolicies = ()
     introspected: bool = False
 
@@ -29,12 +29,12 @@ class Gaps:
     """What stayed unknown: each cause with the places where it was met."""
 
     def __init__(self) -> None:
-        self._places: dict[str, dict[SourceRef, None]] = {}
+        self._places: dict[str, dict[SourceLocation, None]] = {}
 
     def __bool__(self) -> bool:
         return bool(self._places)
 
-    def add(self, source: SourceRef, why: str) -> None:
+    def add(self, source: SourceLocation, why: str) -> None:
         self._places.setdefault(why, {}).setdefault(source)
 
     def include(self, others: Iterable[Gap]) -> None:
@@ -50,7 +50,7 @@ class Gaps:
         return [Gap(next(iter(places)), _counted(why, list(places))) for why, places in self._places.items()]
 
 
-def _counted(why: str, places: list[SourceRef]) -> str:
+def _counted(why: str, places: list[SourceLocation]) -> str:
     if len(places) == 1:
         return why
     others = ", ".join(f"{each.file.rpartition('/')[2]}:{each.line}" for each in places[:SHOWN_PLACES])
@@ -68,7 +68,7 @@ class FoundNode:
         hears_launch: Whether the node obeys the arguments of its process.
     """
 
-    source: SourceRef
+    source: SourceLocation
     created: bool = False
     lifecycle: bool = False
     names: Value = BOTTOM
@@ -113,6 +113,6 @@ class Findings:
         self.gaps = Gaps()
         self.global_words: list[tuple[str, ...] | None] = []  # handed to the client library in code
 
-    def node_of(self, identity: object, source: SourceRef) -> FoundNode:
+    def node_of(self, identity: object, source: SourceLocation) -> FoundNode:
         """Return the node that ``identity`` stands for, new where there was none."""
         return self.nodes.setdefault(identity, FoundNode(source))

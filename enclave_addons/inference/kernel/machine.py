@@ -16,8 +16,8 @@ from enclave_addons.inference.kernel.findings import Findings, FoundEndpoint, Fo
 from enclave_addons.inference.kernel.store import CellId, CellStore, Written, same
 from enclave_addons.inference.kernel.texts import Input, Text, pieces_of, text_of
 from enclave_addons.inference.kernel.values import LocalCells, Obj, Value
+from enclave_common.source_location import SourceLocation
 from nodl.node_interface import EndpointKind, QosPolicies
-from nodl.source_ref import SourceRef
 
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
@@ -349,7 +349,7 @@ class Machine:
         kind: EndpointKind,
         name: object,
         type_name: str,
-        source: SourceRef,
+        source: SourceLocation,
         qos: QosPolicies = (),
     ) -> FoundEndpoint:
         """Add an interface to ``node``, under the conditions that hold here."""
@@ -362,6 +362,6 @@ class Machine:
         node.endpoints.setdefault(found)
         return found
 
-    def gap(self, source: SourceRef, why: str) -> None:
+    def gap(self, source: SourceLocation, why: str) -> None:
         """Note what stays unknown, by its cause."""
         self.findings.gaps.add(source, why)

@@ -30,8 +30,8 @@ from enclave_addons.inference.python.program import Program, ProgramTarget, Sour
 from enclave_addons.inference.python.rclpy_models import is_node_class
 from enclave_addons.inference.python.run import Run
 from enclave_addons.inference.start import NO_LAUNCH, InferredProgram, LaunchKey, ProgramLaunch
+from enclave_common.source_location import SourceLocation
 from nodl.node_interface import ClientLibrary, Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 MAX_NESTING = 9_000  # Python calls of the interpreter
 HANDLERS = (expressions, libraries, statements)  # fill the tables of ``run``
@@ -80,7 +80,7 @@ def start_function(
         for step in path:
             found = value == (module,) and step not in module.cells
             if found:
-                run.gap(SourceRef(main.path), f"the entry point {step} is not defined here")
+                run.gap(SourceLocation(main.path), f"the entry point {step} is not defined here")
                 return
             value = run.attribute(value, step, main.tree, _call(module).frame)
         for atom in value:
@@ -113,11 +113,11 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
         run.given_up = before
     except StepLimitExceeded:
         why = f"this program was given up after {run.steps} steps; any interface beside those listed is possible"
-        run.gap(SourceRef(run.main.path), why)
+        run.gap(SourceLocation(run.main.path), why)
     except RecursionError:
-        run.gap(SourceRef(run.main.path), "this program was given up: it is nested too deep")
+        run.gap(SourceLocation(run.main.path), "this program was given up: it is nested too deep")
     except Exception as error:
-        run.gap(SourceRef(run.main.path), failure(error))
+        run.gap(SourceLocation(run.main.path), failure(error))
     finally:
         sys.setrecursionlimit(limit)
 
@@ -223,7 +223,7 @@ def _run(program: Program, target: ProgramTarget, path: str, launch: ProgramLaun
         return start_function(program, source, target.function, launch)
     run = start(program, source, launch=launch)
     if target.missing:
-        run.gap(SourceRef(path), target.missing)
+        run.gap(SourceLocation(path), target.missing)
     return run
 
 

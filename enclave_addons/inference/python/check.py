@@ -18,8 +18,8 @@ from enclave_addons.inference.python.program import Program, SourceModule
 from enclave_addons.inference.python.rclpy_models import CREATING_NAMES
 from enclave_addons.inference.python.run import Run
 from enclave_addons.inference.python.statements import absolute_name
+from enclave_common.source_location import SourceLocation
 from nodl.node_interface import Gap
-from nodl.source_ref import SourceRef
 
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy)\b")
@@ -125,7 +125,9 @@ def unsettled_places(run: Run, entered: set[ast.AST]) -> list[Gap]:
                 why = (
                     f"{name}() was not followed here" if call in run.visited else f"{name}() was not reached"
                 )
-                gaps.append(Gap(SourceRef(source.path, call.lineno), f"{why}; what it makes is not listed"))
+                gaps.append(
+                    Gap(SourceLocation(source.path, call.lineno), f"{why}; what it makes is not listed")
+                )
     return [*gaps, *_never_entered(run, entered, scopes, live, dead)]
 
 
@@ -156,7 +158,7 @@ def _never_entered(
     }
     return [
         Gap(
-            SourceRef(source.path, getattr(scope.node, "lineno", 0)),
+            SourceLocation(source.path, getattr(scope.node, "lineno", 0)),
             f"{getattr(scope.node, 'name', '')}() {_LOST}",
         )
         for source, scope in left

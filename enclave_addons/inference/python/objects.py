@@ -10,7 +10,7 @@ from typing import NamedTuple
 from enclave_addons.inference.kernel.machine import Jumps
 from enclave_addons.inference.kernel.values import BOTTOM, Cells, External, Obj, Value
 from enclave_addons.inference.python.program import SourceModule
-from nodl.source_ref import SourceRef
+from enclave_common.source_location import SourceLocation
 
 FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 FUNCTION_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
@@ -173,8 +173,8 @@ class Call:
     frame: Frame
 
     @property
-    def source(self) -> SourceRef:
-        return SourceRef(self.frame.module.source.path, getattr(self.node, "lineno", 0))
+    def source(self) -> SourceLocation:
+        return SourceLocation(self.frame.module.source.path, getattr(self.node, "lineno", 0))
 
     def at(self, position: int, keyword: str = "") -> Value | None:
         return self.args.at(position, keyword)

@@ -50,7 +50,7 @@ from enclave_addons.inference.python.objects import (
 )
 from enclave_addons.inference.python.program import Program, SourceModule
 from enclave_addons.inference.start import NO_LAUNCH, ProgramLaunch
-from nodl.source_ref import SourceRef
+from enclave_common.source_location import SourceLocation
 
 BUILTINS = frozenset(dir(builtins))
 COMMAND_LINE = "command line arguments"
@@ -126,14 +126,14 @@ class Run(Machine):
         index = bisect_left(lines, first)
         return index < len(lines) and lines[index] <= last
 
-    def at(self, node: ast.AST, frame: Frame) -> SourceRef:
-        return SourceRef(frame.module.source.path, getattr(node, "lineno", 0))
+    def at(self, node: ast.AST, frame: Frame) -> SourceLocation:
+        return SourceLocation(frame.module.source.path, getattr(node, "lineno", 0))
 
     def not_followed(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.gap(self.at(node, frame), why)
 
     def unsettled(self) -> None:
-        self.gap(SourceRef(self.main.path), "the callbacks do not settle; names may be missing")
+        self.gap(SourceLocation(self.main.path), "the callbacks do not settle; names may be missing")
 
     # --- names ----------------------------------------------------------------------------------------------
 
@@ -383,7 +383,7 @@ class Run(Machine):
         module.cells["__name__"] = (name,)
         module.cells["__file__"] = (source.path,)
         if source.error:
-            self.gap(SourceRef(source.path, source.error_line), f"the file {source.error}")
+            self.gap(SourceLocation(source.path, source.error_line), f"the file {source.error}")
             return module
         frame = Frame(module, module.cells, None, Jumps(self.store.mark()))
         outer, self.context = self.context, ("module", name)

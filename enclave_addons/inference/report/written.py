@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from enclave_addons.inference.kernel.results import UNDECIDED
 from enclave_addons.inference.system import InferredSystem
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import json_text, printable
 from nodl.name_template import NameTemplate, UnknownPart
 from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty, Endpoint, EndpointKind, Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 _STAR = "STAR_OF_A_PATTERN"
 _NODE = "NAME_OF_THE_NODE"
@@ -28,7 +28,7 @@ class ExpandedInterface(NamedTuple):
     name: str
     type: str
     certainty: Certainty
-    source: SourceRef
+    source: SourceLocation
     note: str
 
 

@@ -22,12 +22,12 @@ from enclave_addons.inference.source_digest import source_digest
 from enclave_addons.inference.start import Progress
 from enclave_addons.inference.system import InferredSystem, infer_paths
 from enclave_common.command_line import FLAG, PATH, Option
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import counted_progress, printable
 from enclave_common.words import counted, some_of
 from nodl.ament_index import PackageNotFoundError, executables, package_prefix, search_prefixes
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap, NodeInterface
-from nodl.source_ref import SourceRef
 from nodl.verb import PREFIX, encodable, write_documents
 
 OPTIONS: tuple[Option, ...] = (
@@ -175,5 +175,5 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
     programs = [os.path.join(folder, name) for name in executables(str(folder))]
     inferred = {path: infer_executable(package, Path(path).name, prefixes=prefixes) for path in programs}
     nodes = (node for each in inferred.values() for node in each.interfaces)
-    gaps = (Gap(SourceRef(path), each.why) for path, each in inferred.items() if not each)
+    gaps = (Gap(SourceLocation(path), each.why) for path, each in inferred.items() if not each)
     return InferredSystem(tuple(nodes), tuple(gaps), tuple(programs))

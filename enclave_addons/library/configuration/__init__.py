@@ -16,6 +16,7 @@ from enclave_addons.library.configuration.ros2_control import of_robot_descripti
 from enclave_addons.library.configuration.ros_gz_bridge import of_arguments, of_configuration
 from enclave_addons.library.configuration.rslidar import of_sensors
 from enclave_common.files import read_bytes
+from enclave_common.source_location import SourceLocation
 from nodl.ament_index import MISSING_PREFIX
 from nodl.dependence import Situation
 from nodl.errors import InvalidNoDLError
@@ -25,11 +26,10 @@ from nodl.names import validate_written_name as validate_written_name
 from nodl.node_interface import Endpoint as Endpoint
 from nodl.node_interface import EndpointKind as EndpointKind
 from nodl.node_interface import Gap
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlValue, parse_yaml
 
 
-def read_configuration(kind: str, file: str, situation: Situation, place: SourceRef) -> Configured:
+def read_configuration(kind: str, file: str, situation: Situation, place: SourceLocation) -> Configured:
     """Read what ``file`` (or the command line in ``situation``) asks for.
 
     ``place``: the document that says it is read.
@@ -54,11 +54,11 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     text = situation.files.get(file)
     is_there = text is not None or os.path.isfile(file)
     if kind == "rviz" and not is_there and not file.startswith(f"{MISSING_PREFIX}/"):
-        return rviz.default(SourceRef(file), requested=requested)
+        return rviz.default(SourceLocation(file), requested=requested)
     try:
         root = _read(file, text, last_counts=kind == "rviz")  # as rviz_common's YamlConfigReader does
     except InvalidNoDLError as error:
-        return Configured(gaps=(Gap(SourceRef(file), f"{kind} file cannot be used: {error}"),))
+        return Configured(gaps=(Gap(SourceLocation(file), f"{kind} file cannot be used: {error}"),))
     if kind == "rviz":
         return rviz.of_file(root, situation.distro)
     if kind == "ros_gz_bridge":
@@ -72,8 +72,8 @@ def _read(file: str, text: str | None, *, last_counts: bool) -> YamlValue:
     """Read the file, or ``text`` in its place. Raises ``InvalidNoDLError``, also for a file that is not there."""
     try:
         if text is None and not os.path.isfile(file):
-            raise InvalidNoDLError.at(SourceRef(file), "there is no such file")
+            raise InvalidNoDLError.at(SourceLocation(file), "there is no such file")
         content = read_bytes(file) if text is None else text.encode()
         return parse_yaml(content, file, last_counts=last_counts)
     except OSError as error:
-        raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
+        raise InvalidNoDLError.at(SourceLocation(file), f"cannot be read: {error.strerror}") from None

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
 from enclave_common.files import read_bytes
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from enclave_common.xml_tree import XmlElement
 from nodl.builtin_interfaces import DISTROS
 from nodl.dependence import Situation
 from nodl.errors import InvalidXMLError
 from nodl.node_interface import Endpoint, EndpointKind, Gap
-from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
 
 _MAX_BYTES = 1_000_000
@@ -122,7 +122,7 @@ _MODELS = ("Action", "Condition", "Decorator", "Control")  # elements whose attr
 
 def of_tree(file: str, situation: Situation) -> Configured:
     """Return what the tree in ``file`` uses in ``situation``, that of its navigator."""
-    place = SourceRef(file)
+    place = SourceLocation(file)
     try:
         root = parse_xml(_of_nav2(file, situation.distro) or read_bytes(file, _MAX_BYTES), file)
     except (OSError, InvalidXMLError) as error:
@@ -141,14 +141,14 @@ def _of_nav2(file: str, distro: str) -> str:
     return f"<root>{tree}{_SELECTORS[distro]}{later}</root>"
 
 
-def _used(root: XmlElement, place: SourceRef, situation: Situation) -> Iterator[Endpoint | Gap]:
+def _used(root: XmlElement, place: SourceLocation, situation: Situation) -> Iterator[Endpoint | Gap]:
     models = {part for model in root.iter("TreeNodesModel") for part in model.iter()}
     for element in root.iter():
         if element not in models:
             yield from _of_node(element, place, situation)
 
 
-def _of_node(element: XmlElement, place: SourceRef, situation: Situation) -> Iterator[Endpoint | Gap]:
+def _of_node(element: XmlElement, place: SourceLocation, situation: Situation) -> Iterator[Endpoint | Gap]:
     tag = element.get("ID", element.tag) if element.tag in _MODELS else element.tag
     if tag in _ACTIONS or tag in _CANCELS:
         name, type_name = _ACTIONS[_CANCELS.get(tag, tag)]
@@ -171,5 +171,5 @@ def _of_node(element: XmlElement, place: SourceRef, situation: Situation) -> Ite
         yield Gap(place, f"what the node {quoted(tag)} of the behavior tree uses is not known")
 
 
-def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceRef) -> Endpoint | Gap:
+def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceLocation) -> Endpoint | Gap:
     return endpoint_named(kind, name, type_name, place, f"{tag} of the behavior tree", about=f"{tag}: ")

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
 from enclave_common.files import read_bytes
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
-from nodl.source_ref import SourceRef
 
 _MAX_BYTES = 1_000_000
 _MAX_INCLUDES = 20
@@ -54,7 +54,7 @@ class _Written(NamedTuple):
     """The configuration with its includes in their places, without comments."""
 
     code: str
-    place: SourceRef
+    place: SourceLocation
 
     def text(self, key: str) -> str | None:
         found = re.findall(rf"\b{key}\s*=\s*([^,;}}\n]*)", self.code)
@@ -75,7 +75,7 @@ class _Written(NamedTuple):
 
 def of_lua(file: str) -> Configured:
     """Return what a ``cartographer_node`` with the configuration ``file`` subscribes, and its ``tracked_pose``."""
-    place = SourceRef(file)
+    place = SourceLocation(file)
     try:
         code = _with_includes(Path(file), _MAX_INCLUDES)
         if _COMPUTES.search(code):

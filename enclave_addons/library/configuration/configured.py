@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from enclave_common.source_location import SourceLocation
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, validate_written_name
 from nodl.node_interface import Endpoint, EndpointKind, Gap
-from nodl.source_ref import SourceRef
 
 
 class ConfiguredPlugin(NamedTuple):
@@ -19,7 +19,7 @@ class ConfiguredPlugin(NamedTuple):
 
     what: str
     plugin_class: str
-    place: SourceRef
+    place: SourceLocation
     properties: Mapping[str, object]
     node: str = ""
 
@@ -46,7 +46,7 @@ def collected(parts: Iterable[Endpoint | Gap]) -> Configured:
 
 
 def endpoint_named(
-    kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str, about: str = ""
+    kind: EndpointKind, name: str, type_name: str, place: SourceLocation, note: str, about: str = ""
 ) -> Endpoint | Gap:
     """Return the endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name.
 

@@ -7,15 +7,15 @@ siblings. The filter subscribes to the topic in that message, on its own node.
 from __future__ import annotations
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
+from enclave_common.source_location import SourceLocation
 from nodl.dependence import Situation
 from nodl.names import InvalidNameError
 from nodl.node_interface import EndpointKind, Gap
-from nodl.source_ref import SourceRef
 
 _MASK = "nav_msgs/msg/OccupancyGrid"
 
 
-def of_filter_info(topic: str, situation: Situation, place: SourceRef) -> Configured:
+def of_filter_info(topic: str, situation: Situation, place: SourceLocation) -> Configured:
     """Return the masks that servers of the launch publish on the filter info ``topic``, or a gap if none does."""
     try:
         info = situation.remap(topic)

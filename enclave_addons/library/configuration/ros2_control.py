@@ -9,19 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from enclave_addons.library.configuration.configured import Configured, ConfiguredPlugin
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from enclave_common.xml_tree import XmlElement
 from nodl.builtin_interfaces import DISTROS
 from nodl.errors import InvalidXMLError
 from nodl.node_interface import Gap
-from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
 
 _QUOTED = 80  # characters of a text that is no URDF: it may be a placeholder for the output of a program
 _WITHOUT_NODES = DISTROS[: DISTROS.index("jazzy")]
 
 
-def of_robot_description(text: str, place: SourceRef, distro: str) -> Configured:
+def of_robot_description(text: str, place: SourceLocation, distro: str) -> Configured:
     """Return what the hardware in ``text`` needs: URDF, as a node of the launch publishes it; empty if none has one."""
     if not text:
         why = "no node of this launch has a robot_description, which names the hardware components"
@@ -39,7 +39,7 @@ def of_robot_description(text: str, place: SourceRef, distro: str) -> Configured
     )
 
 
-def _plugins(root: XmlElement, place: SourceRef) -> Iterator[ConfiguredPlugin]:
+def _plugins(root: XmlElement, place: SourceLocation) -> Iterator[ConfiguredPlugin]:
     for component in root.iter("ros2_control"):
         plugins = (child for hardware in component.iter("hardware") for child in hardware)
         for plugin in plugins:

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from enclave_addons.library.configuration.configured import Configured, collected, endpoint_named
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 _DIRECTIONS = {
@@ -29,7 +29,7 @@ def of_configuration(root: YamlValue) -> Configured:
     return collected(part for entry in root.items for part in _entry(entry))
 
 
-def of_arguments(words: Sequence[str], place: SourceRef) -> Configured:
+def of_arguments(words: Sequence[str], place: SourceLocation) -> Configured:
     """Read ``TOPIC@ROS_TYPE{@,[,]}GZ_TYPE`` and ``SERVICE@ROS_SRV_TYPE[@...]``, one a word."""
     return collected(part for word in words for part in _word(word, place))
 
@@ -52,7 +52,7 @@ def _entry(entry: YamlValue) -> Iterator[Endpoint | Gap]:
     yield from _endpoints(_DIRECTIONS[direction], name, type_name, entry.source, "bridge configuration")
 
 
-def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
+def _word(word: str, place: SourceLocation) -> Iterator[Endpoint | Gap]:
     name, at, rest = word.partition("@")
     note = f"argument {word}"
     position = next((index for index, letter in enumerate(rest) if letter in _SEPARATORS), len(rest))
@@ -68,6 +68,6 @@ def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
 
 
 def _endpoints(
-    kinds: Iterable[EndpointKind], name: str, type_name: str, place: SourceRef, note: str
+    kinds: Iterable[EndpointKind], name: str, type_name: str, place: SourceLocation, note: str
 ) -> Iterator[Endpoint | Gap]:
     return (endpoint_named(kind, name, type_name, place, note) for kind in kinds)

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from enclave_addons.library.configuration.configured import Configured, ConfiguredPlugin, endpoint_named
+from enclave_common.source_location import SourceLocation
 from enclave_common.terminal import quoted
 from nodl.node_interface import Endpoint, EndpointKind, Gap
-from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlMap, YamlScalar, YamlValue
 
 _SUBSCRIBE, _PUBLISH = EndpointKind.SUBSCRIPTION, EndpointKind.PUBLISHER
@@ -62,7 +62,7 @@ _SILENT_DISPLAYS = ("Axes", "Grid", "TF")  # /tf is the listener's, which every 
 _SILENT_TOOLS = ("FocusCamera", "Interact", "Measure", "MoveCamera", "Select")
 
 
-def default(place: SourceRef, *, requested: bool) -> Configured:
+def default(place: SourceLocation, *, requested: bool) -> Configured:
     """Return what rviz2 needs for rviz_common/default.rviz, which it loads if its configuration file does not exist.
 
     ``requested``: the launch names that file, so that the user expects it.
@@ -176,13 +176,13 @@ class _Reading:
         name = display.text("Robot Description") or "robot_description"
         self._topic(_SUBSCRIBE, name, display.source, "std_msgs/msg/String", "display of efforts")
 
-    def _camera_info(self, image: str, place: SourceRef) -> None:
+    def _camera_info(self, image: str, place: SourceLocation) -> None:
         """Add the name beside the image, as ``image_transport::getCameraInfoTopic`` does."""
         if image:
             beside = f"{image.rpartition('/')[0]}/camera_info" if "/" in image else "camera_info"
             self._topic(_SUBSCRIBE, beside, place, "sensor_msgs/msg/CameraInfo", "camera of a display")
 
-    def _topic(self, kind: EndpointKind, name: str, place: SourceRef, type_name: str, why: str) -> None:
+    def _topic(self, kind: EndpointKind, name: str, place: SourceLocation, type_name: str, why: str) -> None:
         if not name:
             return  # rviz subscribes nothing until the user chooses a topic
         made = endpoint_named(kind, name, type_name, place, why)
@@ -219,7 +219,7 @@ def _properties(item: YamlMap, prefix: str) -> Iterator[tuple[str, object]]:
             yield from _properties(value, f"{name}.")
 
 
-def _topic(display: YamlMap, key: str) -> tuple[str, SourceRef]:
+def _topic(display: YamlMap, key: str) -> tuple[str, SourceLocation]:
     """Return the name in a topic property: a mapping with ``Value`` (and QoS), or in older files the name itself."""
     found = display.items.get(key)
     if isinstance(found, YamlMap):

@@ -19,9 +19,9 @@ from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
+    from enclave_common.source_location import SourceLocation
     from enclave_launch.description.conditions import Condition
     from enclave_launch.description.parameters.types import Parameters, SomeParameters
-    from enclave_launch.source_location import SourceLocation
 
 
 @read_only(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description.actions.components import (
     ComposableLifecycleNode,
     ComposableNode,
@@ -42,7 +43,6 @@ from enclave_launch.process import (
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.parameters.types import EvaluatedParameters

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.flow import OpaqueFunction
@@ -30,7 +31,6 @@ from enclave_launch.description.typed_values import normalize_typed_substitution
 from enclave_launch.host.current import current_release
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, LauncherCall, ProcessKind
 from enclave_launch.ros_rules.distro import Feature
-from enclave_launch.source_location import SourceLocation
 
 _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 

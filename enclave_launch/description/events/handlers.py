@@ -18,8 +18,8 @@ from enclave_launch.description.events.event import (
 from enclave_launch.host.user_code import called_for_entities
 
 if TYPE_CHECKING:
+    from enclave_common.source_location import SourceLocation
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.source_location import SourceLocation
 
 
 @read_only("handle_once")

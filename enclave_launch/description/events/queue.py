@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from enclave_common.source_location import SourceLocation
     from enclave_launch.description.events.event import Event
-    from enclave_launch.source_location import SourceLocation
 
 
 class Handler(Protocol):

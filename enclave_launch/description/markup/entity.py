@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, List, Protocol, TypeVar, overload  # noqa
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from enclave_launch.source_location import SourceLocation
+    from enclave_common.source_location import SourceLocation
 
 
 T = TypeVar("T")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from xml.etree.ElementTree import ParseError
 from xml.parsers import expat
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.xml_tree import RefusedXml, XmlElement, collect_elements
 from enclave_launch.description.markup.entity import Entity as BaseEntity
 from enclave_launch.description.markup.entity import check_is_list_entity
@@ -16,7 +17,6 @@ from enclave_launch.description.markup.parser import Parser as BaseParser
 from enclave_launch.description.typed_values import get_typed_value
 from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark_at
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from collections.abc import Container

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from typing import Any, TextIO
 
+from enclave_common.source_location import SourceLocation
 from enclave_common.yaml_reader import load_yaml_with_lines
 from enclave_launch.description.markup.entity import Entity as BaseEntity
 from enclave_launch.description.markup.entity import check_is_list_entity
@@ -13,7 +14,6 @@ from enclave_launch.description.markup.parser import Parser as BaseParser
 from enclave_launch.description.typed_values import is_instance_of
 from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark_at
-from enclave_launch.source_location import SourceLocation
 
 _NO_LINES: Mapping[int, int] = {}
 

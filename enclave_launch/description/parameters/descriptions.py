@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Union, cast
 
 import yaml
 
+from enclave_common.source_location import SourceLocation
 from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
@@ -24,7 +25,6 @@ from enclave_launch.description.substitution import (
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
 from enclave_launch.frontend import error_location
 from enclave_launch.ros_rules.parameter_file import MAX_BYTES
-from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext

@@ -14,7 +14,7 @@ from enclave_addons.inference.cpp.engine.machine import Machine
 from enclave_addons.inference.cpp.engine.sites import Site, sites_of
 from enclave_addons.inference.cpp.reading.declarations import Class, FileIndex, Function
 from enclave_addons.inference.cpp.syntax import text
-from nodl.source_ref import SourceRef
+from enclave_common.source_location import SourceLocation
 
 _DECLARES = ("function_declarator", "using_declaration", "template_parameter_list", "friend_declaration")
 _ADDRESS = re.compile(r"&\s*(?:\w+\s*::\s*)+(\w+)")
@@ -29,8 +29,8 @@ class SiteAnswer(NamedTuple):
     reason: str
 
     @property
-    def source(self) -> SourceRef:
-        return SourceRef(self.site.file, self.site.line)
+    def source(self) -> SourceLocation:
+        return SourceLocation(self.site.file, self.site.line)
 
 
 def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:

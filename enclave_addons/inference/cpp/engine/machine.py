@@ -32,10 +32,10 @@ from enclave_addons.inference.cpp.reading.names import Names
 from enclave_addons.inference.cpp.reading.type_names import Type
 from enclave_addons.inference.cpp.syntax import Node, line_of, words_in
 from enclave_addons.inference.start import Start
+from enclave_common.source_location import SourceLocation
 from nodl.dependence import ALWAYS, When
 from nodl.name_template import UnknownPart
 from nodl.node_interface import EndpointKind
-from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from enclave_addons.inference.cpp.libraries import Call
@@ -102,7 +102,7 @@ class Machine:
         self.names, self.start, self.calls = names, start, calls
         self.store = AbstractStore()
         self.nodes: dict[Obj, AllocatedNode] = {}
-        self.gaps: dict[tuple[SourceRef, str], None] = {}
+        self.gaps: dict[tuple[SourceLocation, str], None] = {}
         self.objects: dict[object, Obj] = {}
         self.callbacks: dict[Lambda | Bound, bool] = {}  # with whether a condition may leave it out
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
@@ -110,7 +110,7 @@ class Machine:
         self.closures: dict[int, int] = {}  # how often each ran, by their nodes
         self.dead: dict[tuple[str, int, int], str] = {}
         self.unresolved: dict[
-            str, SourceRef
+            str, SourceLocation
         ] = {}  # words of calls that were not followed, with the first place
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[object] = []
@@ -121,7 +121,9 @@ class Machine:
         self.repeated = 0  # how many loops that are not counted run
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that were decided without a launch
-        self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
+        self.unset: dict[
+            tuple[str, int], tuple[SourceLocation, str, str]
+        ] = {}  # calls on pointers to nothing
         self.histories: dict[Function, object] = {}  # their earlier calls
         self._paths: dict[object, int] = {}
 
@@ -206,8 +208,8 @@ class Machine:
 
     # --- what is found ------------------------------------------------------------------------------------
 
-    def place(self, node: Node, frame: Frame) -> SourceRef:
-        return SourceRef(frame.file.file, line_of(node))
+    def place(self, node: Node, frame: Frame) -> SourceLocation:
+        return SourceLocation(frame.file.file, line_of(node))
 
     def gap(self, node: Node, frame: Frame, why: str, record: AllocatedNode | None = None) -> None:
         """Say that something is not known, of a node or of the program."""
@@ -217,7 +219,7 @@ class Machine:
         else:
             self.gap_at(source, why)
 
-    def gap_at(self, source: SourceRef, why: str) -> None:
+    def gap_at(self, source: SourceLocation, why: str) -> None:
         self.gaps.setdefault((source, why))
 
     def handle(self, node: Node, frame: Frame) -> None:

@@ -1,4 +1,4 @@
-"""The place of an action in its launch file, and the includes that lead there."""
+"""A place in a file: of a launch action with the includes that lead there, of a name in a manifest or a source."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ from typing import NamedTuple
 
 
 class SourceLocation(NamedTuple):
-    """A place in a launch file. ``line`` counts from 1, 0 when unknown. ``element`` is the launch element (``node``)
-    or class."""
+    """A place in a file.
+
+    Args:
+        line: Counts from 1. 0 is the whole file, or an unknown line.
+        element: The launch element (``node``) or class, empty elsewhere.
+    """
 
     file: str
     line: int = 0
