@@ -20,7 +20,7 @@ _PATTERN = re.compile(
           | (?P<good>ok)(?=[ ])
           | (?P<step>\ *try:)(?=[ ]) ) )
     | (?<=[ ]enclave[ ])(?P<enclave>/\S*)
-    | (?P<place>(?:[\w.~-]*/)*[\w.-]+\.(?:py|xml|ya?ml|[ch]pp|hxx|cc|h|p7s|pem|json5?):\d+)
+    | (?<![\w.~/-])(?P<place>[\w.~/-]{1,300}\.(?:py|xml|ya?ml|[ch]pp|hxx|cc|h|p7s|pem|json5?):\d+)
     """
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+import time
 
 import pytest
 
@@ -55,3 +56,10 @@ def test_an_escape_of_others_is_not_taken_for_a_colour(monkeypatch: pytest.Monke
         choose_colour("never")
         print("error: plain")
     assert shown.getvalue() == f"{RED}error\x1b[0m: \\x1b[32mgood\nerror: plain\n"
+
+
+@pytest.mark.parametrize("piece", ["a", "x/", "a.py:", "enclave ", "/"])
+def test_long_lines_take_time_in_proportion(piece: str) -> None:
+    started = time.process_time()
+    coloured(piece * 100_000)
+    assert time.process_time() - started < 5
