@@ -36,12 +36,9 @@ def run(case: Case, distro: str, folder: Path, prefix: Path, *, with_supposition
             evaluation = failure.partial
             shown = likeliest(failure.cause) if failure.cause is not None else failure
             error = (type(shown).__name__, str(shown))
-    # That a plan calls code of events ahead of them is no log of the launch.
-    logs += [
-        ("WARNING", warning.text)
-        for warning in evaluation.warnings
-        if warning.code is not Code.FUNCTION_CALLED_AGAIN
-    ]
+    # Launch has no counterpart of these hints of a plan.
+    hints = (Code.FUNCTION_CALLED_AGAIN, Code.SCOPE_ENDED)
+    logs += [("WARNING", warning.text) for warning in evaluation.warnings if warning.code not in hints]
     folders = {str(folder): "DIR", str(prefix): "PREFIX"}
     return render(_outcome(evaluation, host, logs, error, folders, with_suppositions))
 

@@ -125,9 +125,8 @@ def unsettled_places(run: Run, entered: set[ast.AST]) -> list[Gap]:
                 why = (
                     f"{name}() was not followed here" if call in run.visited else f"{name}() was not reached"
                 )
-                gaps.append(
-                    Gap(SourceLocation(source.path, call.lineno), f"{why}; what it makes is not listed")
-                )
+                place = SourceLocation(source.path, call.lineno)
+                gaps.append(Gap(place, f"{why}; what it makes is not listed"))
     return [*gaps, *_never_entered(run, entered, scopes, live, dead)]
 
 

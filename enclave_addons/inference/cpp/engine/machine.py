@@ -109,9 +109,7 @@ class Machine:
         self.called: set[Function] = set()
         self.closures: dict[int, int] = {}  # how often each ran, by their nodes
         self.dead: dict[tuple[str, int, int], str] = {}
-        self.unresolved: dict[
-            str, SourceLocation
-        ] = {}  # words of calls that were not followed, with the first place
+        self.unresolved: dict[str, SourceLocation] = {}  # words of calls not followed, with the first place
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[object] = []
         self.steps = 0
@@ -121,9 +119,8 @@ class Machine:
         self.repeated = 0  # how many loops that are not counted run
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that were decided without a launch
-        self.unset: dict[
-            tuple[str, int], tuple[SourceLocation, str, str]
-        ] = {}  # calls on pointers to nothing
+        # Calls on pointers to nothing.
+        self.unset: dict[tuple[str, int], tuple[SourceLocation, str, str]] = {}
         self.histories: dict[Function, object] = {}  # their earlier calls
         self._paths: dict[object, int] = {}
 
