@@ -155,13 +155,18 @@ def _model_at(model: type[Strict], place: Place) -> type[Strict] | None:
     """Return the model of the mapping at ``place``."""
     current: Any = model
     for step in place:
-        if isinstance(current, type) and issubclass(current, Strict):
+        if _is_model(current):
             name = _fields(current).get(str(step))
             current = get_type_hints(current).get(name) if name else None
         else:
             current = next(iter(get_args(current)[-1:]), None)
         current = next((each for each in _alternatives(current) if each is not type(None)), None)
-    return current if isinstance(current, type) and issubclass(current, Strict) else None
+    return current if _is_model(current) else None
+
+
+def _is_model(hint: Any) -> bool:
+    # Python 3.10 takes list[int] for a type.
+    return get_origin(hint) is None and isinstance(hint, type) and issubclass(hint, Strict)
 
 
 def _alternatives(hint: Any) -> Iterable[Any]:

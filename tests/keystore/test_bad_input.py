@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.backends.openssl.backend import backend
 
 from keystore import (
     DamagedKeystoreError,
@@ -217,6 +218,9 @@ def test_damage_is_not_deployed(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.skipif(
+    backend.openssl_version_text().startswith("OpenSSL 1"), reason="OpenSSL 1 reads no providers"
+)
 def test_an_openssl_configuration_without_its_provider_is_an_error_with_its_cause(tmp_path: Path) -> None:
     (tmp_path / "fips.cnf").write_text(
         "openssl_conf = init\n[init]\nproviders = sect\nalg_section = alg\n[sect]\nfips = fips\n"
