@@ -129,6 +129,8 @@ _EXPECTED = (
 
 def _expectation(kind: str, message: str) -> str:
     """Return what pydantic 1 (``type_error.str``) or 2 (``string_type``) expected, in words."""
+    if kind == "value_error.strictbool":  # pydantic 1
+        kind = "type_error.bool"
     if kind.startswith("type_error.") or kind.endswith("_type"):
         for word, text in _EXPECTED:
             if word in kind.removeprefix("type_error."):
