@@ -410,7 +410,9 @@ def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -
         # By name: this module must not load cryptography.
         if (type(error).__module__, type(error).__name__) != ("cryptography.exceptions", "InternalError"):
             raise
-        causes = re.findall(r"error:[0-9A-F]{8}:[^:]*:[^:]*:([^:]*):", str(error)) or [str(error)[-200:]]
+        # As the releases of cryptography write it, the newest first.
+        causes = re.findall(r"error:[0-9A-F]{8}:[^:]*:[^:]*:([^:]*):", str(error))
+        causes = causes or re.findall(r"reason_text=b?'?([^)>']*)", str(error)) or [str(error)[-200:]]
         where = os.environ.get("OPENSSL_CONF") or "the machine's openssl.cnf"
         text = f"OpenSSL cannot work as {quoted(where)} configures it: {', '.join(dict.fromkeys(causes))}"
         print(
