@@ -28,16 +28,16 @@ def resolve_root(keystore: Path | str) -> Path:
 
 def folders_of_links(keystore: Path | str) -> list[Path]:
     """Return the folder of each link that leads to the keystore: who can write there can redirect the link."""
-    folders: list[Path] = []
+    links: dict[Path, None] = {}
     waiting = [Path(os.path.abspath(keystore))]
     while waiting:
         path = waiting.pop()
         for place in (path, *path.parents):
-            folder = Path(os.path.realpath(place.parent))
-            if place.is_symlink() and folder not in folders:
-                folders.append(folder)
-                waiting.append(folder / os.readlink(place))
-    return folders
+            link = Path(os.path.realpath(place.parent), place.name)
+            if link.is_symlink() and link not in links:
+                links[link] = None
+                waiting.append(link.parent / os.readlink(link))
+    return list(dict.fromkeys(link.parent for link in links))
 
 
 def read(root: Path, relative: str) -> bytes:

@@ -440,8 +440,10 @@ def test_the_folder_of_a_link_is_judged_as_the_folders_above(
     link.symlink_to(root)
     second = tmp_path / "second"
     second.symlink_to(link)
+    beside = tmp_path / "beside"  # a link to a link of the same folder
+    beside.symlink_to(second)
     is_open = mode == 0o777
-    for given in (link, second):
+    for given in (link, second, beside):
         assert {(finding.code, finding.place) for finding in verify(given).findings} == (
             {("replaceable", str(tmp_path / "shared"))} if is_open else set()
         )
