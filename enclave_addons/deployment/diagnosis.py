@@ -60,7 +60,7 @@ _MODULE_PATH = re.compile(r"[?&]module-path=([^&]+)")
 
 @dataclass(frozen=True)
 class SilenceCause:
-    """What keeps processes silent. ``step`` is one of ``STEPS``; ``repair`` works on this machine."""
+    """A cause for which processes are silent. ``step`` is one of ``STEPS``, and ``repair`` works on this machine."""
 
     step: str
     text: str
@@ -233,7 +233,7 @@ class _Asked:
             )
             yield SilenceCause("discovery", f"{found.variable} {found.why}: {printable(found.value)}", gone)
         if discovery_is_off(self.environment):
-            text = "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: processes meet nobody"
+            text = "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: processes discover no others"
             yield SilenceCause("discovery", text, "export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET")
 
 

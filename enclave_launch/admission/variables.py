@@ -126,7 +126,7 @@ _SERVER = "names a discovery server of Fast DDS, through which secured processes
 def _judged(variable: str, value: str, text: str, environment: Mapping[str, str]) -> Iterator[Foreign]:
     """Report the first thing in ``text`` that a secured process must not have."""
     if not text.strip():
-        yield Foreign(variable, value, "cannot be read, so nobody knows what is in it")
+        yield Foreign(variable, value, "cannot be read, so its settings are unknown")
         return
     written = _REFERENCE.sub(lambda found: environment.get(found[1]) or found[2] or "", text)
     if _SECURITY.search(written):
@@ -135,7 +135,7 @@ def _judged(variable: str, value: str, text: str, environment: Mapping[str, str]
         yield Foreign(variable, value, _SERVER, is_discovery=True)
     elif found := _NO_DISCOVERY.search(written):
         yield Foreign(
-            variable, value, f"has discoveryProtocol {found[1]}: it meets nobody", is_discovery=True
+            variable, value, f"has discoveryProtocol {found[1]}: it discovers no others", is_discovery=True
         )
 
 

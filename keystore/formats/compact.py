@@ -1,4 +1,4 @@
-"""Compact permissions: the six parameter services of a node by one expression. Pure.
+"""Compact permissions: the six parameter services of a node by one expression. Performs no I/O.
 
 Fast DDS carries 63,736 bytes of a signed document, and of a large enclave most are names of parameter services. The
 expression ``/NODE/*_parameter*`` also covers nodes below ``/NODE``, since ``*`` matches ``/``. So it stands only where

@@ -103,7 +103,8 @@ def test_the_distribution_decides_about_moveits_own_pipelines(
 ) -> None:
     found = launch(MOVE_GROUP, distro=distro).processes[0].parameters
     assert found[plugin[0]] == plugin[1]
-    assert len(found["planning_pipelines"]) == pipelines  # type: ignore[arg-type]
+    named = found["planning_pipelines"]
+    assert isinstance(named, tuple) and len(named) == pipelines
 
 
 def test_files_that_are_named_replace_the_usual_ones(launch: Launch, package: Path) -> None:
